@@ -6,9 +6,9 @@ Two kinds use them:
 - a **coupling** maps the active displacement of joint i to the passive displacement of joint i+1.
 
 Conventions. Displacements are rad (m where a joint slides), positive in the sense in which a positive command moves
-the joint; x = 0 is the arm's zero pose. A transmission has no constant term of its own: the zero of a joint is where the
-function says so, and an offset is kept beside it (``MotionFunction.offset``). A coupling is zero at zero: passive motion
-counts from there. Forms are smooth over the whole range of a joint, more than a turn included.
+the joint; x = 0 is the arm's zero pose. A transmission has no constant term of its own: the zero of a joint is where
+the function says so, and an offset is kept beside it (``MotionFunction.offset``). A coupling is zero at zero: passive
+motion counts from there. Forms are smooth over the whole range of a joint, more than a turn included.
 
     direct          f(x) = x                                                        no constants
     ratio           f(x) = r x                                                      linear, with ratio
@@ -19,8 +19,9 @@ counts from there. Forms are smooth over the whole range of a joint, more than a
     gear            f(x) = N x + s sin(N x) + c (cos(N x) - 1)
     arctangent      f(x) = atan((n0 sin x + n1 (cos x - 1)) / (cos x + d1 sin x + d2))        four-bar linkage
 
-The paper writes the arctangent with a constant n2 of its own; counting passive motion from zero makes n2 = -n1. It gives the
-gear of a transmission at the gear's own shaft, f/N; here it is at the joint, so that commands keep the joint's unit.
+The paper writes the arctangent with a constant n2 of its own; counting passive motion from zero makes n2 = -n1. It
+gives the gear of a transmission at the gear's own shaft, f/N; here it is at the joint, so that commands keep the
+joint's unit.
 """
 
 from abc import ABC, abstractmethod
