@@ -1,0 +1,1 @@
+"""Joint axes from measured points."""
