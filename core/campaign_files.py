@@ -61,7 +61,7 @@ def read_campaign(folder: Path | str) -> Campaign:
 
 
 def _digest(*contents: bytes) -> str:
-    """SHA-256, as hex digits, of campaign.toml, robot.toml, measurements.csv and the URDF file, one behind the other."""
+    """SHA-256, as hex digits, of campaign.toml, robot.toml, measurements.csv and the URDF file, in this order."""
     digest = hashlib.sha256()
     for content in contents:
         digest.update(content)
@@ -87,10 +87,11 @@ def _targets(top: TomlTable, robot: Robot) -> tuple[Target, ...]:
     if not tables:
         raise top.failed("no [[target]], expected one for each target that was measured")
     targets = tuple(_target(table, robot) for table in tables)
-    names = [target.name for target in targets]
-    for number, name in enumerate(names):
-        if name in names[:number]:
-            raise tables[number].wrong("name", "a name of its own")
+    seen = set()
+    for target, table in zip(targets, tables, strict=True):
+        if target.name in seen:
+            raise table.wrong("name", "a name of its own")
+        seen.add(target.name)
     return targets
 
 

@@ -140,7 +140,7 @@ def _check_joint(table: TextTable, name: str, robot: Robot) -> None:
     joint = int(found[2])
     if not 1 <= joint <= robot.joint_count:
         raise CampaignError(
-            f"{table.path}, row 1: column {name} belongs to joint {joint}, expected one of joints 1..{robot.joint_count}"
+            f"{table.path}, row 1: column {name} belongs to joint {joint}, expected joints 1..{robot.joint_count}"
         )
     if found[1] == "q" and not robot.commanded[joint - 1]:
         raise CampaignError(f"{table.path}, row 1: column {name}: joint {joint} is passive and has no q column")

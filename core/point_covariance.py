@@ -45,6 +45,6 @@ def _full_matrices(columns: Columns) -> Array | None:
     if flat.any():
         raise columns.table.failed(
             int(np.argmax(flat)),
-            "columns cov_xx_mm2 to cov_zz_mm2: not positive definite, expected a covariance matrix",
+            "columns cov_xx_mm2 to cov_zz_mm2: not a covariance, expected it positive definite",
         )
     return matrices

@@ -78,8 +78,9 @@ def _stops(table: TextTable, target: np.ndarray) -> np.ndarray:
         step = table.integers("step", -1)
         table.check("step", step < 0, "a whole number of at least 0")
     else:
-        same = target[:, None] == np.unique(target)
-        step = np.take_along_axis(np.cumsum(same, axis=0), np.argmax(same, axis=1)[:, None], axis=1)[:, 0]
+        order, count = np.argsort(target, kind="stable"), np.bincount(target)
+        step = np.empty(table.count, dtype=np.int64)
+        step[order] = np.arange(table.count) - np.repeat(np.cumsum(count) - count, count)
     _, first, which = np.unique(step, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[which]
 

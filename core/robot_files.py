@@ -161,7 +161,10 @@ def _drive_ratio(table: TomlTable) -> float | None:
 
 
 def _couplings(top: TomlTable) -> tuple[Coupling, ...]:
-    return tuple(_coupling(table) for table in top.tables("coupling"))
+    tables = top.tables("coupling")
+    if len(tables) > MOST_JOINTS:
+        raise top.failed(f"{len(tables)} [[coupling]] tables, expected at most one a joint")
+    return tuple(_coupling(table) for table in tables)
 
 
 def _coupling(table: TomlTable) -> Coupling:
