@@ -31,8 +31,11 @@ HUBER_LIMIT = 2.0
 """Residual length, in standard deviations, beyond which the robust fit reins a point in."""
 SUBSET = 4000
 """More points than this are first fitted by an even selection of that many."""
+STRAIGHT = "the points cannot be told from a straight line; expected a longer arc or less noise"
 FLAT_ARC = 10.0
 """Where the sagitta stands out of the scatter across the plane by less, both starts are tried."""
+SHORT_ARC = 0.2
+"""... on arcs whose sagitta is less than this share of their chord."""
 MEASURED_RADIUS = 3.0
 """A radius, or its standard deviation's inverse share, below which no axis is claimed."""
 
@@ -48,6 +51,9 @@ class _State:
     height_m: Array
     radius_m: Array
     azimuth_rad: Array | None
+    """Angle of each target ahead of target 0, where stops are shared."""
+    arc_m: Array
+    """Length by which angles are turned into arcs: the radius at the start, kept so that derivatives are exact."""
 
 
 @dataclass(frozen=True)
@@ -99,12 +105,24 @@ def _best_start(points: SweepPoints, robust: bool) -> _State:
     if many:
         points = points.only(np.linspace(0, points.count - 1, SUBSET).astype(int))
     flat = plane_circle(points)
+    across, sagitta, chord = flat.spread_m
     states = [_state_at(points, flat)]
-    if flat.spread_m[1] < FLAT_ARC * flat.spread_m[0]:
+    if sagitta < min(FLAT_ARC * across, SHORT_ARC * chord):
         states.append(_state_at(points, arc_start(points)))
     if len(states) == 1 and not many:
         return states[0]
-    return min((_refine(points, state, robust) for state in states), key=lambda found: found[1].cost)[0]
+    found = [refined for state in states if (refined := _try_refine(points, state, robust))]
+    if not found:
+        raise NotConverged("the fit of a joint axis did not converge in 100 steps")
+    return min(found, key=lambda refined: refined[1].cost)[0]
+
+
+def _try_refine(points: SweepPoints, state: _State, robust: bool) -> tuple[_State, _Rows, Array | None] | None:
+    """From one of several starts; a start that leads nowhere is no error."""
+    try:
+        return _refine(points, state, robust)
+    except (NotConverged, AxisUndefined):
+        return None
 
 
 def _refine(points: SweepPoints, state: _State, robust: bool) -> tuple[_State, _Rows, Array | None]:
@@ -161,7 +179,7 @@ def _state_at(points: SweepPoints, start: PlaneCircle) -> _State:
     height = np.bincount(target, along - along.mean(), points.target_count) / counts
     radius = np.bincount(target, np.hypot(x, y), points.target_count) / counts
     azimuth = None if points.stop is None else _azimuths(points, np.arctan2(y, x))
-    return _State(points.point_m.mean(axis=0), point, start.direction, height, radius, azimuth)
+    return _State(points.point_m.mean(axis=0), point, start.direction, height, radius, azimuth, radius)
 
 
 def _azimuths(points: SweepPoints, phi: Array) -> Array:
@@ -199,6 +217,7 @@ def _moved(state: _State, step: Array) -> _State:
         state.height_m + step[4 : 4 + k],
         state.radius_m + step[4 + k : 4 + 2 * k],
         azimuth,
+        state.arc_m,
     )
 
 
@@ -225,24 +244,25 @@ def _rows(points: SweepPoints, state: _State) -> _Rows:
         matrix[each, 0, 4 + points.target] = matrix[each, 1, 4 + k + points.target] = -1.0
         raw[:, 0], raw[:, 1] = z - state.height_m[points.target], rho - state.radius_m[points.target]
     if shared:
-        raw[:, 2] = _tangential(points, state, matrix, np.arctan2(y, x), (cosine, sine, z - lever_z))
+        raw[:, 2] = _tangential(points, state, matrix, np.arctan2(y, x), (cosine, sine, z - lever_z, rho))
     return _whitened(points, matrix, raw, basis, cosine, sine, state)
 
 
 def _tangential(points: SweepPoints, state: _State, matrix: Array, phi: Array, cylinder: tuple[Array, ...]) -> Array:
     """Fill the third row of the derivatives and return the residual along the arc."""
-    cosine, sine, along = cylinder
+    cosine, sine, along, rho = cylinder
     target = points.target_index()
-    radius = state.radius_m[target]
-    matrix[:, 2, 0], matrix[:, 2, 1] = along * sine, -along * cosine
-    matrix[:, 2, 2], matrix[:, 2, 3] = sine, -cosine
+    arc = state.arc_m[target]
+    by_sine, by_cosine = arc / rho * sine, arc / rho * cosine
+    matrix[:, 2, 0], matrix[:, 2, 1] = along * by_sine, -along * by_cosine
+    matrix[:, 2, 2], matrix[:, 2, 3] = by_sine, -by_cosine
     later = np.flatnonzero(target > 0)
-    matrix[later, 2, 4 + 2 * points.target_count + target[later] - 1] = -radius[later]
+    matrix[later, 2, 4 + 2 * points.target_count + target[later] - 1] = -arc[later]
     ahead = phi - state.azimuth_rad[target]
-    weight = radius**2
+    weight = arc**2
     unit = np.exp(1j * ahead)
     mean = np.bincount(points.stop, weight * unit.real) + 1j * np.bincount(points.stop, weight * unit.imag)
-    return radius * wrap_angle(ahead - np.angle(mean)[points.stop])
+    return arc * wrap_angle(ahead - np.angle(mean)[points.stop])
 
 
 def _whitened(
@@ -254,13 +274,14 @@ def _whitened(
     if points.covariance_m2 is not None:
         factor = _whitener(points.covariance_m2, basis, cosine, sine)[:, :components, :components]
         matrix, residual = factor @ matrix, (factor @ residual[:, :, None])[:, :, 0]
-        arc = factor[:, :, 2] * state.radius_m[points.target_index()][:, None] if components == 3 else None
+        arc = factor[:, :, 2] * state.arc_m[points.target_index()][:, None] if components == 3 else None
     elif points.sigma_m is not None:
         scale = 1.0 / points.sigma_m
-        matrix, residual = matrix * scale[:, None, None], residual * scale[:, None]
-        arc = _along_arc(scale * state.radius_m[points.target_index()]) if components == 3 else None
+        matrix *= scale[:, None, None]
+        residual = residual * scale[:, None]
+        arc = _along_arc(scale * state.arc_m[points.target_index()]) if components == 3 else None
     else:
-        arc = _along_arc(state.radius_m[points.target_index()]) if components == 3 else None
+        arc = _along_arc(state.arc_m[points.target_index()]) if components == 3 else None
     if arc is not None:
         matrix, residual = _without_stop_angles(points.stop, arc, matrix, residual)
     return _Rows(matrix, residual, raw)
@@ -308,15 +329,14 @@ def _solve_normal(normal: Array, gradient: Array) -> Array:
 
 
 def _inverse(normal: Array) -> Array:
-    """Inverse of an information matrix, scaled first; directions without information get none."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    scaled = normal * scale[:, None] * scale
-    try:
-        np.linalg.cholesky(scaled - 1e-13 * np.eye(len(scaled)))
-        inverse = np.linalg.inv(scaled)
-    except np.linalg.LinAlgError:
-        inverse = np.linalg.pinv(scaled, rcond=1e-13, hermitian=True)
-    return inverse * scale[:, None] * scale
+    """Inverse of an information matrix, scaled first; unknowns that no point touches (diagonal 0) stay put."""
+    diagonal = np.diag(normal)
+    touched = diagonal > 0
+    scale = np.where(touched, 1.0 / np.sqrt(np.where(touched, diagonal, 1.0)), 0.0)
+    scaled = normal * scale[:, None] * scale + np.diag(~touched * 1.0)
+    if np.linalg.eigvalsh(scaled)[0] < 1e-14:
+        raise AxisUndefined(STRAIGHT)
+    return np.linalg.inv(scaled) * scale[:, None] * scale
 
 
 def _result(points: SweepPoints, state: _State, rows: _Rows, weight: Array | None) -> AxisFit:

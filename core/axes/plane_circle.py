@@ -15,6 +15,9 @@ from core.axes.points import SweepPoints
 from core.errors import AxisUndefined
 from core.geometry import Array
 
+SIGNIFICANT_BEND = 3.0
+"""An arc counts as bent where its curvature is that many standard deviations."""
+
 
 @dataclass(frozen=True)
 class PlaneCircle:
@@ -45,6 +48,8 @@ def plane_circle(points: SweepPoints, debias: bool = True) -> PlaneCircle:
 def arc_start(points: SweepPoints) -> PlaneCircle:
     """The axis from the curvature of the longest arc: for arcs so short that no plane stands out of the noise.
 
+    Raises AxisUndefined where the arc is not bent significantly.
+
     Along its chord s an arc is ``p0 + t s + n s^2 / 2R``; the second-order coefficient gives both the direction of the
     centre and the radius, and the axis is normal to chord and sagitta.
     """
@@ -57,12 +62,21 @@ def arc_start(points: SweepPoints) -> PlaneCircle:
     coefficients = np.linalg.lstsq(np.stack([np.ones_like(s), s, s**2 / 2], axis=1), arc - middle, rcond=None)[0]
     bend = coefficients[2] - chord * (chord @ coefficients[2])
     curvature = np.linalg.norm(bend)
-    if curvature * np.ptp(s) < 1e-12:
-        raise AxisUndefined("the points lie on one straight line: no joint axis can be told from them")
+    if curvature < SIGNIFICANT_BEND * _bend_noise(arc - middle, chord, s, coefficients):
+        raise AxisUndefined("the points cannot be told from a straight line; expected a longer arc or less noise")
     direction = np.cross(chord, bend / curvature)
     centred, _ = _about_target_means(points)
     spread = np.sqrt(np.mean((centred @ np.stack([direction, bend / curvature, chord], axis=1)) ** 2, axis=0))
     return PlaneCircle(middle + bend / curvature**2, direction, spread)
+
+
+def _bend_noise(arc: Array, chord: Array, s: Array, coefficients: Array) -> float:
+    """Standard deviation of one component of the second-order coefficient, by the scatter about the parabola."""
+    design = np.stack([np.ones_like(s), s, s**2 / 2], axis=1)
+    scatter = arc - design @ coefficients
+    scatter = scatter - np.outer(scatter @ chord, chord)
+    variance = float(np.sum(scatter**2)) / max(2 * len(s) - 6, 1)
+    return float(np.sqrt(variance * np.linalg.inv(design.T @ design)[2, 2]))
 
 
 def check_extent(spread_m: Array, reach_m: float) -> None:
@@ -72,7 +86,7 @@ def check_extent(spread_m: Array, reach_m: float) -> None:
             "all points are at one place: the joint did not move, or the target sits on its axis; "
             "expected points along an arc"
         )
-    if spread_m[1] <= 1e-9 * spread_m[2]:
+    if spread_m[1] <= 1e-7 * spread_m[2]:
         raise AxisUndefined("the points lie on one straight line: no joint axis can be told from them")
 
 
