@@ -9,6 +9,7 @@ import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -99,7 +100,7 @@ class TextTable:
             if not cell.strip():
                 continue
             if not _NUMBER.fullmatch(cell):
-                raise self.wrong(row, column, "a number or nothing")
+                raise self.wrong(row, column, "a number")
             values[row] = float(cell)
             if not abs(values[row]) <= limit:
                 raise self.wrong(row, column, f"a number between {-limit:g} and {limit:g}")
@@ -117,13 +118,15 @@ def read_text_table(path: Path) -> tuple[TextTable, bytes]:
     lines: list[int] = []
     try:
         header = _header(source, next(reader, []))
-        rows = list(_rows(source, ((reader.line_num, row) for row in reader), len(header), lines))
+        columns = _by_columns(
+            _rows(source, ((reader.line_num, row) for row in reader), len(header), lines), len(header)
+        )
     except csv.Error as wrong:
         told = " ".join(str(wrong).split())
         raise CampaignError(f"{path}, row {reader.line_num}: {told}, expected plain CSV") from None
-    if not rows:
+    if not lines:
         raise CampaignError(f"{path} has a header and no rows, expected one row a measured point")
-    return TextTable(path, dict(zip(header, zip(*rows, strict=True), strict=True)), lines), source.data
+    return TextTable(path, dict(zip(header, columns, strict=True)), lines), source.data
 
 
 def _header(source: InputText, cells: list[str]) -> list[str]:
@@ -155,3 +158,12 @@ def _rows(
             raise CampaignError(f"{source.path} has more than {MOST_ROWS} rows, expected at most as many")
         lines.append(line)
         yield row
+
+
+def _by_columns(rows: Iterator[list[str]], width: int) -> list[list[str]]:
+    """Rows turned into columns, some thousands at a time, so that not all rows are in memory as well."""
+    columns: list[list[str]] = [[] for _ in range(width)]
+    while chunk := list(islice(rows, 10_000)):
+        for column, cells in zip(columns, zip(*chunk, strict=True), strict=True):
+            column.extend(cells)
+    return columns

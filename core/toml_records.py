@@ -13,8 +13,9 @@ LIMIT_BYTES = 1_000_000
 HUGE = 1e12
 """No honest number in a file is larger; squares of what passes cannot overflow."""
 
-# A key of thousands of dotted parts takes the parser minutes; nobody writes one.
-_ENDLESS_KEY = re.compile(r"""(?<![\w\-"'])(?:[\w\-"']+[ \t]*\.[ \t]*){32}""")
+# A key of thousands of dotted parts takes the parser minutes and all memory; nobody writes one.
+_PART = r"""(?:[\w\-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')"""
+_ENDLESS_KEY = re.compile(rf"(?<![\w\-\\])(?:{_PART}[ \t]*\.[ \t]*){{32}}")
 
 
 class TomlTable:
