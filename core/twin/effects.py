@@ -43,7 +43,7 @@ CATALOGUE = (
     _kind("eccentricity", JOINT, "angle length", "deg", "x + size (0.8 sin u + 0.6 cos u), u once a turn", "mm"),
     _kind("mesh", JOINT, "angle length", "deg", "x + size sin(9.5 u + 0.5)", "mm"),
     _kind("backlash", JOINT, "angle length", "deg", "x - size/2 sign(approach)", "mm"),
-    _kind("compliance", JOINT, "compliance give", "urad/Nm", "x + size times the torque of gravity", "um/N"),
+    _kind("compliance", JOINT, "compliance give", "urad/Nm", "x + size times the drive's gravity torque", "um/N"),
     _kind("coupling", COUPLING, "fraction", "1", "net of the second joint + size times x of the first"),
     _kind("axis_wobble", JOINT, "angle length", "deg", "the axis tilts or shifts by size (sin 2u, cos 2u - 1)", "mm"),
     _kind("latency", JOINT_OR_ALL, "time", "ms", "x - size times the speed"),

@@ -68,3 +68,14 @@ def joint_loads(loads: Loads, frames_at_rest: Array, motions: Array, sliding: np
         load = loads.force(i + 1) if sliding[i] else loads.moments(i + 1, origin)
         out[:, i] = np.sum(axis * load, axis=1)
     return out
+
+
+def drive_loads(robot: Robot, on_joints: Array) -> Array:
+    """The torque (N m) or force (N) that each motor has to hold, (m, n), from those on the joints (m, n).
+
+    A motor that also turns the next joint through a linkage feels that joint's load times the gain (virtual work):
+    where a parallelogram keeps the forearm level, the upper arm's motor does not carry the forearm's lever.
+    """
+    held = on_joints.copy()
+    held[:, :-1] += robot.coupling_gains[1:] * on_joints[:, 1:]
+    return held

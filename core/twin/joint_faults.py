@@ -15,7 +15,7 @@ from core.geometry import Array
 from core.twin.cell import Cell, chain
 from core.twin.effect_units import Quantity
 from core.twin.effects import Effect
-from core.twin.gravity import Loads, joint_loads, own_loads
+from core.twin.gravity import Loads, drive_loads, joint_loads, own_loads
 
 SPINDLE_TURN_M = 0.04
 """Travel of a sliding joint for one turn of its spindle."""
@@ -60,8 +60,13 @@ class Motion:
 
     @cached_property
     def torques(self) -> Array:
-        """Of all weights on the joints, (m, n), N m or N."""
-        return joint_loads(self.loads, self.frames_at_rest, self.links, self.cell.robot.sliding)
+        """Of all weights on the drives, (m, n), N m or N."""
+        return self.held(self.loads)
+
+    def held(self, loads: Loads) -> Array:
+        """What the drives have to hold of some loads, (m, n), N m or N."""
+        robot = self.cell.robot
+        return drive_loads(robot, joint_loads(loads, self.frames_at_rest, self.links, robot.sliding))
 
     def slides(self, joint: int) -> bool:
         return self.cell.robot.joints[joint - 1].slides
@@ -127,7 +132,7 @@ def _hysteresis(effect: Effect, motion: Motion, joint: int) -> Array:
 
 
 def _compliance(effect: Effect, motion: Motion, joint: int) -> Array:
-    """size times the torque (force) of gravity on the joint; size = 1/stiffness"""
+    """size times the torque (force) of gravity on the drive; size = 1/stiffness"""
     return effect.size * motion.torques[:, joint - 1]
 
 
@@ -169,7 +174,7 @@ def _payload(motion: Motion) -> Array:
         raise InputError(f"effect payload: the joints of {motion.cell.robot.name} are rigid, so no mass shows")
     cell = motion.cell
     load = own_loads(cell.robot, motion.frames_at_rest, motion.links, motion.extra_kg, links=False)
-    return joint_loads(load, motion.frames_at_rest, motion.links, cell.robot.sliding) / cell.stiffness
+    return motion.held(load) / cell.stiffness
 
 
 FAULTS: dict[str, Callable[[Effect, Motion, int], Array]] = {
