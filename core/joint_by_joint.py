@@ -177,7 +177,7 @@ class _FromTheBase:
         self.drives = drives
         self.axes: list[Line] = []
         self.couplings: list[FunctionFit | None] = [None] * n
-        self.measured: list[tuple[AxisFit, Array]] = []
+        self.measured: list[tuple[AxisFit | None, Array]] = []
         self.nominal = campaign.robot.axes_at_zero()
 
     def run(self) -> None:
@@ -194,15 +194,13 @@ class _FromTheBase:
     def axis_covariance(self) -> Array:
         """Covariance of all axes at zero: each sweep's own, and what the angles of the joints below add."""
         n = self.campaign.robot.joint_count
-        out = np.full((4 * n, 4 * n), 0.0)
-        for k, (line, (fit, net)) in enumerate(zip(self.axes, self.measured, strict=True)):
-            size = len(fit.covariance) if fit is not None else 0
+        out = np.zeros((4 * n, 4 * n))
+        for k, (fit, _) in enumerate(self.measured):
             own = np.full((4, 4), np.nan)
             if fit is not None:
                 own = np.zeros((4, 4))
-                own[:size, :size] = fit.covariance
+                own[: len(fit.covariance), : len(fit.covariance)] = fit.covariance
             out[4 * k : 4 * k + 4, 4 * k : 4 * k + 4] = own
-            del line, net
         return out + self._covariance_by_angles()
 
     def _covariance_by_angles(self) -> Array:
@@ -240,16 +238,20 @@ class _FromTheBase:
     def _net_below(self, sweep_fit: SweepFit, joint: int) -> Array:
         """Net displacements of the joints below a joint while a sweep of it was measured, (joint - 1,)."""
         asked = active_from_zero(self.campaign, sweep_fit.sweep.commanded[:1])[0]
-        return self._net(asked[None, :])[0, : joint - 1]
+        return self._net(self._active(asked[None, :]))[0, : joint - 1]
 
-    def _net(self, asked: Array) -> Array:
-        """Net displacements for commanded active ones, with the couplings known so far, (m, n)."""
+    def _active(self, asked: Array) -> Array:
+        """Active displacements for commanded ones, by the transmission functions, (m, n)."""
         home = self.campaign.home is not None
         active = np.zeros_like(asked)
         for k, function in enumerate(self.functions):
             if self.drives[k] is not None:
                 plain = replace(function, offset=0.0)
                 active[:, k] = plain.inverse(asked[:, k] + (plain(0.0) if home else 0.0))
+        return active
+
+    def _net(self, active: Array) -> Array:
+        """Net displacements, with the couplings known so far, (m, n)."""
         net = active.copy()
         for k, coupling in enumerate(coupling_functions(self.campaign, self.couplings)):
             if coupling is not None and self.drives[k] is not None:
@@ -301,22 +303,25 @@ class _FromTheBase:
         rows = np.flatnonzero(links >= joint)
         if len(rows) < 3:
             return None
-        net = self._net(asked)
-        active = self._net(asked)[:, joint - 2] - self._passive_of(joint - 1, asked)
-        points = sweep.point_m[rows] @ (below := self._to_zero(net[0], joint - 1))[:3, :3].T + below[:3, 3]
+        active = self._observed(motion, self._active(asked))
+        net = self._net(active)
+        below = self._to_zero(net[0], joint - 1)
+        points = sweep.point_m[rows] @ below[:3, :3].T + below[:3, 3]
         sliding = bool(self.campaign.robot.sliding[joint - 2])
         points = carried_back(points, self.axes[joint - 2], net[sweep.stop[rows], joint - 2], sliding)
         whole = replace(axis, used=np.ones(len(rows), dtype=bool))
         std = np.full(len(active), float(np.nanmean(motion.displacements.std)))
-        return passive_curve(whole, points, sweep.stop[rows], sweep.target[rows], active, gain, std)
+        return passive_curve(whole, points, sweep.stop[rows], sweep.target[rows], active[:, joint - 2], gain, std)
 
-    def _passive_of(self, joint: int, asked: Array) -> Array:
-        """Passive displacement of a joint, to be taken off its net one, (m,)."""
-        function = coupling_functions(self.campaign, self.couplings)[joint - 1]
-        if function is None:
-            return np.zeros(len(asked))
-        active_below = self._net(asked)[:, joint - 2]
-        return function(active_below)
+    def _observed(self, motion: SweepMotion, active: Array) -> Array:
+        """Active displacements with those of the swept joint as they were seen, not as the function has them."""
+        joint = motion.found.sweep.joint
+        same = [m for m in self.motions if m.found.sweep.joint == joint]
+        start = self.drives[joint - 1].start[next(k for k, m in enumerate(same) if m.found is motion.found)]
+        seen = np.isfinite(motion.displacements.value)
+        out = active.copy()
+        out[seen, joint - 1] = start + motion.displacements.value[seen]
+        return out
 
 
 def _turned(fit: AxisFit, line: Line, motion: Array) -> AxisFit:

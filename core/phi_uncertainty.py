@@ -79,5 +79,5 @@ def _base_twists(base: Array, lines: tuple[Line, ...], convention: Convention) -
 
 
 def _heading_is_agreed(convention: Convention) -> bool:
-    """Where an axis beyond the second gives Y_1 its heading, frame 1's own angles stay free, and the heading is agreed."""
+    """Where an axis beyond the second gives Y_1 its heading, both angles of frame 1 are free and the heading is not."""
     return convention.heading_joint != 1

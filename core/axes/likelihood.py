@@ -151,9 +151,10 @@ def _descend(
     cost = _weighted_cost(rows, weight)
     for _ in range(40):
         new_state = _moved(state, step)
-        new_rows = _rows(points, new_state)
+        # Weights are held while the step is judged: they turn with the axis, and the derivatives leave that out.
+        new_rows = _rows(points, new_state, weights_of=state)
         if _weighted_cost(new_rows, weight) <= cost * (1 + 1e-12):
-            return new_state, new_rows
+            return new_state, new_rows if points.covariance_m2 is None else _rows(points, new_state)
         step = step / 2
     return state, rows
 
@@ -221,7 +222,7 @@ def _moved(state: _State, step: Array) -> _State:
     )
 
 
-def _rows(points: SweepPoints, state: _State) -> _Rows:
+def _rows(points: SweepPoints, state: _State, weights_of: _State | None = None) -> _Rows:
     """Residuals and derivatives by (tilt 1, tilt 2, shift 1, shift 2, heights, radii, azimuths)."""
     e1, e2 = perpendicular_basis(state.direction)
     basis = np.stack([e1, e2, state.direction])
@@ -245,7 +246,10 @@ def _rows(points: SweepPoints, state: _State) -> _Rows:
         raw[:, 0], raw[:, 1] = z - state.height_m[points.target], rho - state.radius_m[points.target]
     if shared:
         raw[:, 2] = _tangential(points, state, matrix, np.arctan2(y, x), (cosine, sine, z - lever_z, rho))
-    return _whitened(points, matrix, raw, basis, cosine, sine, state)
+    local = None
+    if points.covariance_m2 is not None:
+        local = _local_frames(points, state if weights_of is None else weights_of)
+    return _whitened(points, matrix, raw, local, state)
 
 
 def _tangential(points: SweepPoints, state: _State, matrix: Array, phi: Array, cylinder: tuple[Array, ...]) -> Array:
@@ -265,14 +269,12 @@ def _tangential(points: SweepPoints, state: _State, matrix: Array, phi: Array, c
     return arc * wrap_angle(ahead - np.angle(mean)[points.stop])
 
 
-def _whitened(
-    points: SweepPoints, matrix: Array, raw: Array, basis: Array, cosine: Array, sine: Array, state: _State
-) -> _Rows:
+def _whitened(points: SweepPoints, matrix: Array, raw: Array, local: Array | None, state: _State) -> _Rows:
     """Divide by the noise, and eliminate what each stop's free angle can explain."""
     components = matrix.shape[1]
     residual = raw[:, :components]
-    if points.covariance_m2 is not None:
-        factor = _whitener(points.covariance_m2, basis, cosine, sine)[:, :components, :components]
+    if local is not None:
+        factor = _whitener(points.covariance_m2, local)[:, :components, :components]
         matrix, residual = factor @ matrix, (factor @ residual[:, :, None])[:, :, 0]
         arc = factor[:, :, 2] * state.arc_m[points.target_index()][:, None] if components == 3 else None
     elif points.sigma_m is not None:
@@ -291,15 +293,22 @@ def _along_arc(length: Array) -> Array:
     return np.stack([np.zeros_like(length), np.zeros_like(length), length], axis=1)
 
 
-def _whitener(covariance_m2: Array, basis: Array, cosine: Array, sine: Array) -> Array:
+def _local_frames(points: SweepPoints, state: _State) -> Array:
+    """Axial, radial and tangential unit vectors at each point, as rows, (k, 3, 3)."""
+    relative = points.point_m - state.point_m
+    outward = relative - np.outer(relative @ state.direction, state.direction)
+    outward /= np.maximum(np.sqrt(np.einsum("ij,ij->i", outward, outward)), 1e-300)[:, None]
+    local = np.empty((points.count, 3, 3))
+    local[:, 0], local[:, 1] = state.direction, outward
+    local[:, 2] = np.cross(state.direction, outward)
+    return local
+
+
+def _whitener(covariance_m2: Array, local: Array) -> Array:
     """Lower triangular factors L^-1 of C = L L' in (axial, radial, tangential) coordinates, (k, 3, 3).
 
     The leading block of L^-1 is that of the leading block of C: dropping the tangential component marginalises it.
     """
-    local = np.zeros((len(cosine), 3, 3))
-    local[:, 0] = basis[2]
-    local[:, 1] = cosine[:, None] * basis[0] + sine[:, None] * basis[1]
-    local[:, 2] = cosine[:, None] * basis[1] - sine[:, None] * basis[0]
     factor = np.linalg.cholesky(local @ covariance_m2 @ local.swapaxes(1, 2))
     return np.linalg.inv(factor)
 

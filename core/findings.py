@@ -1,0 +1,191 @@
+"""What the numbers say of an arm, in sentences like those of section 4 of the paper.
+
+A finding compares the calibrated arm with the nominal one in a quantity that means something to the one who has to mend
+it: how far apart two axes are, how far from parallel, where a drive's zero is. Each comes with its standard uncertainty and
+is called significant where it exceeds two of them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.estimate import ArmEstimate
+from core.geometry import Array, Line, angle_between, line_distance
+from core.motion_forms import MotionFunction
+from core.phi_convention import PARALLEL_SINE
+from core.phi_model import PhiModel
+from core.robot import Robot
+
+SIGNIFICANT = 2.0
+"""A deviation is significant beyond that many standard uncertainties."""
+PARAMETER_WORDS = {
+    "a_m": "offset a",
+    "b_m": "distance b",
+    "alpha_rad": "angle alpha",
+    "theta_rad": "angle theta",
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One deviation of the arm from its design."""
+
+    text: str
+    parameter: str
+    deviation: float
+    """Actual minus nominal, m or rad."""
+    std: float
+    frame: int | None = None
+    joint: int | None = None
+
+    @property
+    def significant(self) -> bool:
+        return bool(abs(self.deviation) > SIGNIFICANT * self.std)
+
+    @property
+    def is_length(self) -> bool:
+        return self.parameter.endswith("_m")
+
+
+def findings(robot: Robot, nominal: PhiModel | None, estimate: ArmEstimate) -> tuple[Finding, ...]:
+    """All findings, the significant ones first, each group by how many uncertainties it deviates.
+
+    Args:
+        robot: the nominal robot.
+        nominal: its phi-model; None: not every joint was swept, so that only the drives are judged.
+        estimate: the calibrated arm.
+    """
+    found = [*_of_drives(robot, estimate)]
+    if nominal is not None and estimate.geometry is not None:
+        found += _of_axis_pairs(robot, estimate)
+        found += _of_parameters(nominal, estimate)
+    return tuple(sorted(found, key=lambda f: (not f.significant, -abs(f.deviation) / max(f.std, 1e-15))))
+
+
+def _of_parameters(nominal: PhiModel, estimate: ArmEstimate) -> list[Finding]:
+    geometry, found = estimate.geometry, []
+    difference = geometry.model.parameters - nominal.parameters
+    for i, row in enumerate(difference):
+        for k, (name, words) in enumerate(PARAMETER_WORDS.items()):
+            if geometry.std[i, k] > 0:
+                size = _signed(row[k], geometry.std[i, k], name)
+                found.append(
+                    Finding(
+                        f"frame {i + 1}: {words} is {size} off its design value",
+                        name,
+                        row[k],
+                        geometry.std[i, k],
+                        i + 1,
+                    )
+                )
+    return found
+
+
+def _of_axis_pairs(robot: Robot, estimate: ArmEstimate) -> list[Finding]:
+    """Distances and angles between consecutive axes: they do not depend on any choice of frames."""
+    nominal, actual, found = robot.axes_at_zero(), estimate.arm.axes, []
+    for i in range(robot.joint_count - 1):
+        pair = slice(4 * i, 4 * i + 8)
+        covariance = np.nan_to_num(estimate.axis_covariance[pair, pair])
+        names = f"axes {i + 1} and {i + 2}"
+        angle = _deviation(_angle, nominal[i : i + 2], actual[i : i + 2], covariance)
+        parallel = abs(np.sin(_angle(*nominal[i : i + 2]))) < PARALLEL_SINE
+        found.append(_angle_finding(names, i + 1, angle, parallel))
+        if not robot.sliding[i] and not robot.sliding[i + 1]:
+            distance = _plane_distance if parallel else line_distance
+            found.append(
+                _distance_finding(
+                    names, i + 1, _deviation(distance, nominal[i : i + 2], actual[i : i + 2], covariance), parallel
+                )
+            )
+    return found
+
+
+def _angle_finding(names: str, frame: int, deviation: tuple[float, float], parallel: bool) -> Finding:
+    size, std = deviation
+    if parallel:
+        text = f"{names} are {_plain(abs(size), std, 'rad')} out of parallel"
+    else:
+        text = f"{names} enclose an angle {_plain(abs(size), std, 'rad')} {'larger' if size > 0 else 'smaller'} than designed"
+    return Finding(text, "angle_rad", size, std, frame=frame)
+
+
+def _distance_finding(names: str, frame: int, deviation: tuple[float, float], parallel: bool) -> Finding:
+    size, std = deviation
+    verb = "are" if parallel else "pass each other"
+    text = f"{names} {verb} {_plain(abs(size), std, 'm')} {'further apart' if size > 0 else 'closer together'} than designed"
+    return Finding(text, "distance_m", size, std, frame=frame)
+
+
+def _angle(first: Line, second: Line) -> float:
+    angle = angle_between(first.direction, second.direction)
+    return min(angle, np.pi - angle) if abs(np.sin(angle)) < PARALLEL_SINE else angle
+
+
+def _plane_distance(first: Line, second: Line) -> float:
+    """Distance of nearly parallel axes where they are best known: from the point of one to the other."""
+    between = second.point_m - first.point_m
+    return float(np.linalg.norm(between - first.direction * (between @ first.direction)))
+
+
+def _deviation(measure, nominal: tuple[Line, ...], actual: tuple[Line, ...], covariance: Array) -> tuple[float, float]:
+    """Actual minus nominal value of a measure of two lines, and its standard uncertainty."""
+    from core.arm_jacobian import _moved_axis
+
+    gradient = np.zeros(8)
+    for k in range(8):
+        step = np.zeros(8)
+        step[k] = 1e-6
+        high = measure(_moved_axis(actual[0], step[:4]), _moved_axis(actual[1], step[4:]))
+        low = measure(_moved_axis(actual[0], -step[:4]), _moved_axis(actual[1], -step[4:]))
+        gradient[k] = (high - low) / 2e-6
+    return measure(*actual) - measure(*nominal), float(np.sqrt(max(gradient @ covariance @ gradient, 0.0)))
+
+
+def _of_drives(robot: Robot, estimate: ArmEstimate) -> list[Finding]:
+    found = []
+    for joint, fit in enumerate(estimate.transmissions, 1):
+        if fit is None:
+            continue
+        slides = bool(robot.sliding[joint - 1])
+        suffix = "_m" if slides else "_rad"
+        offset, std = estimate.arm.transmissions[joint - 1].offset, float(estimate.offset_std[joint - 1])
+        if std > 0 or offset != 0:
+            found.append(_zero_finding(robot, joint, estimate, suffix))
+        if fit.form.name == "ratio":
+            error, std = 1.0 / fit.coefficients[0] - 1.0, float(fit.std[0]) / fit.coefficients[0] ** 2
+            text = f"joint {joint} moves {abs(error):.2%} +- {std:.2%} {'further' if error > 0 else 'less far'} than commanded"
+            found.append(Finding(text, "ratio", error, std, joint=joint))
+        elif len(fit.coefficients) >= 2:
+            found.append(_periodic_finding(joint, MotionFunction(fit.form, fit.coefficients), fit.covariance))
+    return found
+
+
+def _zero_finding(robot: Robot, joint: int, estimate: ArmEstimate, suffix: str) -> Finding:
+    """What the joint reads at the arm's marks, where it should read zero."""
+    reading = float(estimate.arm.commanded_for(np.zeros(robot.joint_count))[0, joint - 1])
+    text = f"joint {joint} reads {_plain(reading, 0.0, suffix[1:])} at the arm's marks, where it should read zero"
+    return Finding(text, f"zero{suffix}", reading, 0.0, joint=joint)
+
+
+def _periodic_finding(joint: int, function: MotionFunction, covariance: Array) -> Finding:
+    s, c = function.coefficients[:2]
+    size = float(np.hypot(s, c)) * function.form.constants().get("N", 1.0)
+    gradient = np.zeros(len(function.coefficients))
+    gradient[:2] = np.array([s, c]) / max(np.hypot(s, c), 1e-15) * function.form.constants().get("N", 1.0)
+    std = float(np.sqrt(gradient @ covariance @ gradient))
+    text = f"the drive of joint {joint} errs by up to {_plain(size, std, 'rad')} once a turn"
+    return Finding(text, "eccentricity_rad", size, std, joint=joint)
+
+
+def _plain(value: float, std: float, unit: str) -> str:
+    """A size with its standard uncertainty, in mm or deg: 3.1 mm +- 0.2 mm."""
+    scale, name = (1e3, "mm") if unit == "m" else (180 / np.pi, "deg")
+    value, std = value * scale, std * scale
+    digits = 3 if std <= 0 else int(np.clip(1 - np.floor(np.log10(std)), 0, 4))
+    error = f" +- {std:.{digits}f} {name}" if std > 0 else ""
+    return f"{value:.{digits}f} {name}{error}"
+
+
+def _signed(value: float, std: float, parameter: str) -> str:
+    return ("+" if value >= 0 else "") + _plain(value, std, "m" if parameter.endswith("_m") else "rad")
