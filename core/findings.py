@@ -1,16 +1,16 @@
 """What the numbers say of an arm, in sentences like those of section 4 of the paper.
 
-A finding compares the calibrated arm with the nominal one in a quantity that means something to the one who has to mend
-it: how far apart two axes are, how far from parallel, where a drive's zero is. Each comes with its standard uncertainty and
-is called significant where it exceeds two of them.
+A finding compares the calibrated arm with the nominal one in a quantity that means something to the one who has to
+mend it: how far apart two axes are, how far from parallel, where a drive's zero is. Each comes with its standard
+uncertainty and is called significant where it exceeds two of them.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from core.estimate import ArmEstimate
-from core.geometry import Array, Line, angle_between, line_distance
+from core.estimate import ArmEstimate, axis_basis
+from core.geometry import Array, Line, angle_between, common_normal, cross
 from core.motion_forms import MotionFunction
 from core.phi_convention import PARALLEL_SINE
 from core.phi_model import PhiModel
@@ -86,18 +86,17 @@ def _of_axis_pairs(robot: Robot, estimate: ArmEstimate) -> list[Finding]:
     nominal, actual, found = robot.axes_at_zero(), estimate.arm.axes, []
     for i in range(robot.joint_count - 1):
         pair = slice(4 * i, 4 * i + 8)
-        covariance = np.nan_to_num(estimate.axis_covariance[pair, pair])
+        covariance = estimate.axis_covariance[pair, pair]
         names = f"axes {i + 1} and {i + 2}"
-        angle = _deviation(_angle, nominal[i : i + 2], actual[i : i + 2], covariance)
-        parallel = abs(np.sin(_angle(*nominal[i : i + 2]))) < PARALLEL_SINE
-        found.append(_angle_finding(names, i + 1, angle, parallel))
+        parallel = abs(np.sin(angle_between(nominal[i].direction, nominal[i + 1].direction))) < PARALLEL_SINE
+        measures = [(_angle_finding, axis_angle)]
         if not robot.sliding[i] and not robot.sliding[i + 1]:
-            distance = _plane_distance if parallel else line_distance
-            found.append(
-                _distance_finding(
-                    names, i + 1, _deviation(distance, nominal[i : i + 2], actual[i : i + 2], covariance), parallel
-                )
-            )
+            measures.append((_distance_finding, parallel_distance if parallel else crossing_distance))
+        for finding, measure in measures:
+            value, gradient = measure(actual[i], actual[i + 1])
+            deviation = value - measure(nominal[i], nominal[i + 1])[0]
+            std = float(np.sqrt(max(gradient @ covariance @ gradient, 0.0)))
+            found.append(finding(names, i + 1, (deviation, std), parallel))
     return found
 
 
@@ -117,29 +116,45 @@ def _distance_finding(names: str, frame: int, deviation: tuple[float, float], pa
     return Finding(text, "distance_m", size, std, frame=frame)
 
 
-def _angle(first: Line, second: Line) -> float:
-    angle = angle_between(first.direction, second.direction)
-    return min(angle, np.pi - angle) if abs(np.sin(angle)) < PARALLEL_SINE else angle
+def axis_angle(first: Line, second: Line) -> tuple[float, Array]:
+    """The angle between two axes, near parallel ones taken without sense, and its gradient, (8,).
+
+    Gradients are by tilts and shifts of the first axis, then of the second, see ``ArmEstimate.axis_covariance``.
+    """
+    sense = -1.0 if first.direction @ second.direction < -np.cos(np.arcsin(PARALLEL_SINE)) else 1.0
+    one, two = first.direction, sense * second.direction
+    angle = angle_between(one, two)
+    sine = max(np.sin(angle), 1e-12)
+    by_first = axis_basis(first.direction) @ ((np.cos(angle) * one - two) / sine)
+    by_second = sense * axis_basis(second.direction) @ ((np.cos(angle) * two - one) / sine)
+    return angle, np.concatenate([by_first, np.zeros(2), by_second, np.zeros(2)])
 
 
-def _plane_distance(first: Line, second: Line) -> float:
-    """Distance of nearly parallel axes where they are best known: from the point of one to the other."""
-    between = second.point_m - first.point_m
-    return float(np.linalg.norm(between - first.direction * (between @ first.direction)))
+def crossing_distance(first: Line, second: Line) -> tuple[float, Array]:
+    """The shortest distance between two axes that are not parallel, and its gradient, (8,)."""
+    foot_1, foot_2 = common_normal(first, second)
+    normal = cross(first.direction, second.direction)
+    normal = normal / np.linalg.norm(normal)
+    apart = float((foot_2 - foot_1) @ normal)
+    return abs(apart), np.sign(apart) * _by_feet(first, second, normal, foot_1, foot_2)
 
 
-def _deviation(measure, nominal: tuple[Line, ...], actual: tuple[Line, ...], covariance: Array) -> tuple[float, float]:
-    """Actual minus nominal value of a measure of two lines, and its standard uncertainty."""
-    from core.arm_jacobian import _moved_axis
+def parallel_distance(first: Line, second: Line) -> tuple[float, Array]:
+    """The distance of the second axis' point from the first axis, for nearly parallel axes, and its gradient, (8,)."""
+    foot = first.foot_of(second.point_m)
+    apart = float(np.linalg.norm(second.point_m - foot))
+    normal = (second.point_m - foot) / max(apart, 1e-12)
+    return apart, _by_feet(first, second, normal, foot, second.point_m)
 
-    gradient = np.zeros(8)
-    for k in range(8):
-        step = np.zeros(8)
-        step[k] = 1e-6
-        high = measure(_moved_axis(actual[0], step[:4]), _moved_axis(actual[1], step[4:]))
-        low = measure(_moved_axis(actual[0], -step[:4]), _moved_axis(actual[1], -step[4:]))
-        gradient[k] = (high - low) / 2e-6
-    return measure(*actual) - measure(*nominal), float(np.sqrt(max(gradient @ covariance @ gradient, 0.0)))
+
+def _by_feet(first: Line, second: Line, normal: Array, foot_1: Array, foot_2: Array) -> Array:
+    """Change of the distance of two feet along their normal: a tilt moves a foot by its way along the axis."""
+    out = np.empty(8)
+    for at, line, foot, sign in ((0, first, foot_1, -1.0), (4, second, foot_2, 1.0)):
+        along = sign * axis_basis(line.direction) @ normal
+        out[at : at + 2] = along * ((foot - line.point_m) @ line.direction)
+        out[at + 2 : at + 4] = along
+    return out
 
 
 def _of_drives(robot: Robot, estimate: ArmEstimate) -> list[Finding]:

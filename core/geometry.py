@@ -45,6 +45,17 @@ class Line:
         return Line(transform[:3, :3] @ self.point_m + transform[:3, 3], transform[:3, :3] @ self.direction)
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Cross products of vectors of shape (..., 3); several times faster than numpy's for few vectors."""
+    a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
+    b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    out[..., 0] = a1 * b2 - a2 * b1
+    out[..., 1] = a2 * b0 - a0 * b2
+    out[..., 2] = a0 * b1 - a1 * b0
+    return out
+
+
 def skew(vector: ArrayLike) -> Array:
     """The matrix of the cross product: ``skew(a) @ b == a x b``; shape (..., 3, 3)."""
     v = np.asarray(vector, dtype=float)
@@ -116,7 +127,7 @@ def perpendicular_basis(direction: ArrayLike) -> tuple[Array, Array]:
 def angle_between(u: ArrayLike, v: ArrayLike) -> float:
     """The angle in [0, pi] between two vectors, accurate near 0 and pi."""
     u, v = np.asarray(u, dtype=float), np.asarray(v, dtype=float)
-    return float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
+    return float(np.arctan2(np.linalg.norm(cross(u, v)), u @ v))
 
 
 def wrap_angle(angle_rad: ArrayLike) -> Array:
@@ -130,24 +141,24 @@ def common_normal(first: Line, second: Line) -> tuple[Array, Array]:
     Raises:
         ValueError: the lines are parallel, so that the normal has no place.
     """
-    cross = np.cross(first.direction, second.direction)
-    square = cross @ cross
+    normal = cross(first.direction, second.direction)
+    square = normal @ normal
     if square < 1e-24:
         raise ValueError("parallel lines have no common normal of their own")
     between = second.point_m - first.point_m
-    along_first = np.cross(between, second.direction) @ cross / square
-    along_second = np.cross(between, first.direction) @ cross / square
+    along_first = cross(between, second.direction) @ normal / square
+    along_second = cross(between, first.direction) @ normal / square
     return first.point_m + along_first * first.direction, second.point_m + along_second * second.direction
 
 
 def line_distance(first: Line, second: Line) -> float:
     """The shortest distance between two lines, in metres."""
     between = second.point_m - first.point_m
-    cross = np.cross(first.direction, second.direction)
-    sine = np.linalg.norm(cross)
+    normal = cross(first.direction, second.direction)
+    sine = np.linalg.norm(normal)
     if sine < 1e-9:
-        return float(np.linalg.norm(np.cross(between, first.direction)))
-    return float(abs(between @ cross) / sine)
+        return float(np.linalg.norm(cross(between, first.direction)))
+    return float(abs(between @ normal) / sine)
 
 
 def rigid_fit(points_a_m: ArrayLike, points_b_m: ArrayLike, weights: ArrayLike | None = None) -> Array:

@@ -19,7 +19,7 @@ from core.displacement import Displacements, displacements
 from core.errors import CampaignError, TrueaxisError
 from core.estimate import ArmEstimate, axis_basis
 from core.function_fit import FunctionFit, SweepCurve
-from core.geometry import Array, Line, invert, joint_motion
+from core.geometry import Array, Line, cross, invert, joint_motion
 from core.measurements import Campaign
 from core.motion_forms import MotionFunction, coupling_form, transmission_form
 from core.phi_convention import Convention
@@ -225,8 +225,8 @@ class _FromTheBase:
         basis = axis_basis(line.direction)
         if self.campaign.robot.sliding[j]:
             return -np.concatenate([np.zeros(2), basis @ below.direction])
-        shift = np.cross(below.direction, line.point_m - below.point_m)
-        return -np.concatenate([basis @ np.cross(below.direction, line.direction), basis @ shift])
+        shift = cross(below.direction, line.point_m - below.point_m)
+        return -np.concatenate([basis @ cross(below.direction, line.direction), basis @ shift])
 
     def _net_by_constants(self, drive: FunctionFit, net: float) -> Array:
         at = np.array([net])

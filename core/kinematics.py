@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from core.errors import RobotError
-from core.geometry import Array
+from core.geometry import Array, cross
 from core.robot import Robot
 
 
@@ -78,7 +78,7 @@ def joint_jacobian(robot: Robot, net: ArrayLike) -> Array:
     frames = link_frames(robot, net)
     axes, origins = frames[:, :-1, :3, 2], frames[:, :-1, :3, 3]
     sliding = robot.sliding[None, :, None]
-    velocity = np.where(sliding, axes, np.cross(axes, frames[:, -1:, :3, 3] - origins))
+    velocity = np.where(sliding, axes, cross(axes, frames[:, -1:, :3, 3] - origins))
     turning = np.where(sliding, 0.0, axes)
     return np.concatenate([velocity, turning], axis=2).swapaxes(1, 2)
 

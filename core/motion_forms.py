@@ -119,10 +119,12 @@ class Harmonics(MotionForm):
         return np.zeros(2 * self.orders)
 
     def evaluate(self, x: Array, coefficients: Array) -> tuple[Array, Array, Array]:
-        k = np.arange(1, self.orders + 1)
-        sine, cosine = np.sin(x[:, None] * k), np.cos(x[:, None] * k)
-        gradient = np.stack([sine, cosine], axis=2).reshape(len(x), -1)
-        turned = np.stack([k * cosine, -k * sine], axis=2).reshape(len(x), -1)
+        gradient, turned = np.empty((len(x), 2 * self.orders)), np.empty((len(x), 2 * self.orders))
+        for k in range(1, self.orders + 1):
+            angle = x if k == 1 else k * x
+            sine, cosine = np.sin(angle), np.cos(angle)
+            gradient[:, 2 * k - 2], gradient[:, 2 * k - 1] = sine, cosine
+            turned[:, 2 * k - 2], turned[:, 2 * k - 1] = k * cosine, -k * sine
         return x + gradient @ coefficients, 1.0 + turned @ coefficients, gradient
 
 
@@ -225,13 +227,14 @@ class MotionFunction:
         """
         value = np.asarray(value, dtype=float)
         wanted = value.ravel() - self.offset
-        at_zero, slope_at_zero, _ = self.form.evaluate(np.zeros(1), self.coefficients)
-        x = (wanted - at_zero) / slope_at_zero
-        for _ in range(30):
+        start, slope, _ = self.form.evaluate(np.zeros(1), self.coefficients)
+        x = (wanted - start) / slope
+        for _ in range(40):
             now, slope, _ = self.form.evaluate(x, self.coefficients)
             step = (now - wanted) / slope
             x = x - step
-            if np.all(np.abs(step) <= 1e-14 * (1.0 + np.abs(x))):
+            # Newton squares the error: after a step this small the next would be lost in rounding.
+            if np.abs(step).max(initial=0.0) <= 1e-9:
                 break
         return x.reshape(value.shape)
 

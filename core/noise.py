@@ -44,6 +44,25 @@ def is_stated(covariance_m2: Array) -> bool:
     return bool(len(covariance_m2)) and bool(np.isfinite(covariance_m2).all())
 
 
+def noise_from_scatter(observed_m2: float, stated_m2: float, components: int, degrees_of_freedom: float) -> Noise:
+    """The noise that explains a sum of squared residuals: a moment estimate that depends on no weights.
+
+    Args:
+        observed_m2: sum of squared residual components, loss to the fit made up for.
+        stated_m2: sum of the stated variances of the same components; NaN where none is stated.
+        components: how many there are.
+        degrees_of_freedom: of the fits that left them.
+    """
+    if not np.isfinite(stated_m2):
+        return Noise(False, added_m=max(float(np.sqrt(observed_m2 / components)), 1e-12))
+    ratio = observed_m2 / stated_m2
+    if degrees_of_freedom < FEWEST_FREEDOMS and abs(ratio - 1) < 3 * np.sqrt(2 / max(degrees_of_freedom, 1)):
+        return Noise(True)
+    if ratio >= 1:
+        return Noise(True, 1.0, float(np.sqrt((observed_m2 - stated_m2) / components)))
+    return Noise(True, max(ratio, 1e-12), 0.0)
+
+
 def updated_noise(noise: Noise, stated_m2: Array, chi_square: float, degrees_of_freedom: float) -> Noise:
     """The noise under which a fit's chi-square would equal its degrees of freedom.
 

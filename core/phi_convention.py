@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.errors import RobotError
-from core.geometry import Array, Line, common_normal, transform
+from core.geometry import Array, Line, common_normal, cross, transform
 from core.phi_transforms import link_to, link_transform, phi_transform
 
 PARALLEL_SINE = np.sin(np.deg2rad(10.0))
@@ -91,7 +91,7 @@ def convention_for(
         raise RobotError("an arm on which every joint slides has no axis with a place in space")
     origin = int(np.argmin(sliding))
     offset, heading = _heading(lines, sliding, origin)
-    base_y = np.cross(lines[0].direction, lines[heading].direction)
+    base_y = cross(lines[0].direction, lines[heading].direction)
     sign = 1.0
     if not offset and y_reference is not None and abs(base_y @ y_reference) > 1e-6:
         sign = float(np.sign(base_y @ y_reference))
@@ -122,15 +122,15 @@ def base_frame(lines: tuple[Line, ...], convention: Convention) -> Array:
         y = lines[convention.heading_joint].point_m - origin
         y = y - z * (z @ y)
     else:
-        y = convention.heading_sign * np.cross(z, lines[convention.heading_joint].direction)
+        y = convention.heading_sign * cross(z, lines[convention.heading_joint].direction)
     y = y / np.linalg.norm(y)
-    return transform(np.stack([np.cross(y, z), y, z], axis=1), origin)
+    return transform(np.stack([cross(y, z), y, z], axis=1), origin)
 
 
 def _heading(lines: tuple[Line, ...], sliding: np.ndarray, origin: int) -> tuple[bool, int]:
     """Whether Y_1 points to an axis or along a cross product, and the index of that axis."""
     for k in range(1, len(lines)):
-        sine = np.linalg.norm(np.cross(lines[0].direction, lines[k].direction))
+        sine = np.linalg.norm(cross(lines[0].direction, lines[k].direction))
         if sine > PARALLEL_SINE:
             return False, k
         if not sliding[0] and not sliding[k] and _offset(lines[0], lines[k]) > 1e-3:
@@ -139,13 +139,13 @@ def _heading(lines: tuple[Line, ...], sliding: np.ndarray, origin: int) -> tuple
 
 
 def _offset(first: Line, second: Line) -> float:
-    return float(np.linalg.norm(np.cross(second.point_m - first.point_m, first.direction)))
+    return float(np.linalg.norm(cross(second.point_m - first.point_m, first.direction)))
 
 
 def _first_not_parallel(lines: tuple[Line, ...], sliding: np.ndarray, origin: int) -> int | None:
     """The nearest later turning axis that is not parallel to the one that carries the origin."""
     for k in range(origin + 1, len(lines)):
-        crossing = np.linalg.norm(np.cross(lines[origin].direction, lines[k].direction)) > PARALLEL_SINE
+        crossing = np.linalg.norm(cross(lines[origin].direction, lines[k].direction)) > PARALLEL_SINE
         if crossing and not sliding[k]:
             return k
     return None
@@ -157,7 +157,7 @@ def _choose_phi(lines: tuple[Line, ...], rule: Convention) -> Convention:
     for i, line in enumerate(lines[1:]):
         if i > 0:
             candidates = phi_transform(np.array([0.0, np.pi / 2]))
-            sines = np.linalg.norm(np.cross((frame @ candidates)[:, :3, 2], line.direction), axis=1)
+            sines = np.linalg.norm(cross((frame @ candidates)[:, :3, 2], line.direction), axis=1)
             phi_rad[i] = np.pi / 2 if sines[1] > sines[0] + 1e-6 else 0.0
         phi_frame = frame @ phi_transform(phi_rad[i])
         row = link_to(line, phi_frame, bool(rule.sliding[i + 1]), float(rule.flips[i]), i + 1)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from core.errors import RobotError
-from core.geometry import Array, Line, joint_motion, wrap_angle
+from core.geometry import Array, Line, cross, joint_motion, wrap_angle
 from core.phi_convention import Convention, base_frame
 from core.phi_transforms import link_to, link_transform, phi_transform
 
@@ -128,8 +128,8 @@ def parameter_twists(model: PhiModel, base: Array | None = None) -> Array:
     twists = [
         np.concatenate([zero, z_phi], axis=1),
         np.concatenate([zero, x_next], axis=1),
-        np.concatenate([x_next, np.cross(origin_next, x_next)], axis=1),
-        np.concatenate([z_phi, np.cross(origin_phi, z_phi)], axis=1),
+        np.concatenate([x_next, cross(origin_next, x_next)], axis=1),
+        np.concatenate([z_phi, cross(origin_phi, z_phi)], axis=1),
     ]
     return np.stack(twists, axis=1)
 
@@ -140,7 +140,7 @@ def joint_twists(model: PhiModel, displacements: ArrayLike, base: Array | None =
     z, origin = chain[..., :3, 2], chain[..., :3, 3]
     slides = np.asarray(model.sliding)[:, None]
     angular = np.where(slides, 0.0, z)
-    return np.concatenate([angular, np.where(slides, z, np.cross(origin, z))], axis=-1)
+    return np.concatenate([angular, np.where(slides, z, cross(origin, z))], axis=-1)
 
 
 def moved_axes(lines: tuple[Line, ...], displacements: ArrayLike, sliding: np.ndarray) -> tuple[Line, ...]:

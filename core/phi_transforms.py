@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from core.errors import RobotError
-from core.geometry import Array, Line
+from core.geometry import Array, Line, cross
 
 
 def phi_transform(u_rad: ArrayLike, d_m: ArrayLike = 0.0) -> Array:
@@ -49,7 +49,7 @@ def link_to(line: Line, phi_frame: Array, slides: bool, flip: float, number: int
         RobotError: Z_phi is parallel to the axis.
     """
     x_phi, y_phi, z_phi, origin = phi_frame[:3, :4].T
-    normal = np.cross(z_phi, line.direction)
+    normal = cross(z_phi, line.direction)
     sine = np.sqrt(normal @ normal)
     if sine < 1e-6:
         raise RobotError(
@@ -61,5 +61,5 @@ def link_to(line: Line, phi_frame: Array, slides: bool, flip: float, number: int
     if slides:
         return 0.0, 0.0, float(alpha), float(theta)
     between = line.point_m - origin
-    across = np.cross(x_next, line.direction)
+    across = cross(x_next, line.direction)
     return float(between @ across / (z_phi @ across)), float(between @ x_next), float(alpha), float(theta)

@@ -8,7 +8,7 @@ beyond it; the inverse carries the covariance of the axes over to the parameters
 import numpy as np
 
 from core.estimate import Geometry, axis_basis
-from core.geometry import Array, Line
+from core.geometry import Array, Line, cross
 from core.phi_convention import Convention
 from core.phi_model import PhiModel, from_axes, near, parameter_twists
 
@@ -52,8 +52,8 @@ def _axes_by_twists(lines: tuple[Line, ...], twists: Array, first: int) -> Array
     out = np.zeros((4 * len(lines), len(twists)))
     for k, line in enumerate(lines[first:], first):
         basis = axis_basis(line.direction)
-        out[4 * k : 4 * k + 2] = basis @ np.cross(twists[:, :3], line.direction).T
-        out[4 * k + 2 : 4 * k + 4] = basis @ (twists[:, 3:] + np.cross(twists[:, :3], line.point_m)).T
+        out[4 * k : 4 * k + 2] = basis @ cross(twists[:, :3], line.direction).T
+        out[4 * k + 2 : 4 * k + 4] = basis @ (twists[:, 3:] + cross(twists[:, :3], line.point_m)).T
     return out
 
 
@@ -67,7 +67,7 @@ def _measured_rows(sliding: np.ndarray) -> np.ndarray:
 def _base_twists(base: Array, lines: tuple[Line, ...], convention: Convention) -> Array:
     """The ways in which axes can move the base frame: three turns and three shifts, less what is agreed."""
     x, y, z, origin = base[:3, :4].T
-    turns = [(axis, np.cross(origin, axis)) for axis in (x, y, z)]
+    turns = [(axis, cross(origin, axis)) for axis in (x, y, z)]
     if _heading_is_agreed(convention):
         turns = turns[:2]
     shifts = [(np.zeros(3), axis) for axis in (x, y, z)]

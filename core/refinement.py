@@ -25,7 +25,7 @@ from core.axes.result import outlier_probabilities
 from core.errors import NotConverged
 from core.estimate import ArmEstimate
 from core.function_fit import FunctionFit
-from core.geometry import Array
+from core.geometry import Array, cross
 from core.joint_by_joint import SweepMotion, drive_functions, offset_std
 from core.measurements import Campaign
 from core.motion_forms import MotionFunction
@@ -35,6 +35,8 @@ from core.phi_model import PhiModel
 from core.phi_uncertainty import geometry_from_axes
 from core.sweep_fits import SweepFits, active_from_zero
 
+SETTLED = 0.03
+"""The noise is estimated anew until it changes by less than this share; its own uncertainty is no smaller."""
 EXCESS_SHARE = 1.5
 """Variance along the arcs over what the noise explains, beyond which a joint gets an excess of its own."""
 
@@ -95,20 +97,22 @@ def refine(
     problem = _Problem.of(campaign, found, start)
     used = np.concatenate([f.used for f in found.fits])
     state, noise, excess = problem.start_state(start), found.noise, np.zeros(campaign.robot.joint_count)
+    prediction = predict(state, problem.seen, problem.layout)
     for _ in range(12):
-        covariance = problem.covariance(noise, excess, predict(state, problem.seen, problem.layout))
-        state, solved = problem.solve(state, covariance, used)
+        state, solved = problem.solve(state, prediction, problem.covariance(noise, excess, prediction), used)
+        prediction = solved.prediction
         better = updated_noise(noise, problem.stated_m2[used], solved.chi_square, solved.degrees_of_freedom)
-        more = problem.arc_excess(solved.prediction, better, used)
+        more = problem.arc_excess(prediction, better, used)
         worst = _worst_outlier(solved, used)
-        settled = np.isclose(better.rms_m(problem.stated_m2), noise.rms_m(problem.stated_m2), rtol=1e-3)
-        settled = bool(settled) and np.allclose(more, excess, rtol=0.05, atol=1e-9) and worst is None
-        noise, excess = better, more
-        if settled:
+        growth = better.rms_m(problem.stated_m2[used]) / noise.rms_m(problem.stated_m2[used])
+        noise, settled = better, np.allclose(more, excess, rtol=0.05, atol=1e-9) and abs(growth - 1) < SETTLED
+        excess = more
+        if settled and worst is None:
             break
         if worst is not None:
             used = used.copy()
             used[worst] = False
+    solved = replace(solved, covariance=solved.covariance * growth**2)
     return problem.result(campaign, state, solved, noise, excess, used, start, convention, nominal)
 
 
@@ -186,10 +190,11 @@ class _Problem:
             out = out + along[:, :, None] * along[:, None, :]
         return out
 
-    def solve(self, state: ArmState, covariance: Array, used: np.ndarray) -> tuple[ArmState, _Solved]:
-        """Gauss-Newton with step halving under fixed weights."""
+    def solve(
+        self, state: ArmState, prediction: Prediction, covariance: Array, used: np.ndarray
+    ) -> tuple[ArmState, _Solved]:
+        """Gauss-Newton with step halving under fixed weights, from a state and its prediction."""
         whitener = np.linalg.inv(np.linalg.cholesky(covariance)) * used[:, None, None]
-        prediction = predict(state, self.seen, self.layout)
         residual, cost = self._whitened(whitener, prediction)
         freedom = max(3 * int(used.sum()) - self.layout.size, 1)
         for _ in range(50):
@@ -197,7 +202,7 @@ class _Problem:
             inverse, lost = _inverse(matrix.T @ matrix)
             gradient = matrix.T @ residual
             step = inverse @ gradient
-            if gradient @ step <= 1e-8 * cost / freedom + 1e-20:
+            if gradient @ step <= 1e-6 * cost / freedom + 1e-20:
                 probability = self._probability(matrix, inverse, residual, cost, used)
                 return state, _Solved(prediction, inverse, cost, freedom + lost, lost, probability)
             for _ in range(30):
@@ -325,7 +330,7 @@ class _Problem:
         along = arm / np.maximum(np.linalg.norm(arm, axis=1), 1e-300)[:, None]
         axes = self._axes_in_place(state)
         slides = self.seen.sliding[self.joint - 1]
-        outward = np.cross(along, axes)
+        outward = cross(along, axes)
         tangential = np.einsum("mi,mi->m", along, residual)
         axial = np.einsum("mi,mi->m", axes, residual)
         radial = np.einsum("mi,mi->m", outward, residual)

@@ -1,15 +1,15 @@
 """The first step of a calibration: the axis of every sweep, the noise of the points, and what stands out."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from core.axes import AxisFit, fit_axis
 from core.errors import AxisUndefined, CampaignError, InputError
-from core.geometry import Array
+from core.geometry import Array, cross
 from core.kinematics import active_commands
 from core.measurements import Campaign, Sweep
-from core.noise import Noise, is_stated, updated_noise
+from core.noise import Noise, is_stated, noise_from_scatter
 
 SAME_COMMAND = 1e-7
 """Commands closer than this, rad or m, are the same."""
@@ -67,15 +67,10 @@ def fit_sweeps(campaign: Campaign, estimator: str = "likelihood", reject: bool =
         _require_one_motor(campaign, sweep)
     rows = [_rows_of_axis(campaign, sweep) for sweep in moved]
     noise = _first_noise(moved)
-    for _ in range(3):
+    # Twice: with the noise as stated, and with the noise that the first fits show.
+    for _ in range(2):
         fits = tuple(_fit(campaign, s, r, noise, estimator, reject) for s, r in zip(moved, rows, strict=True))
-        better = _noise_of(fits, noise)
-        settled = (
-            abs(better.factor - noise.factor) < 1e-3 and abs(better.added_m - noise.added_m) <= 0.01 * better.added_m
-        )
-        noise = better
-        if settled:
-            break
+        noise = _noise_of(fits)
     idle = {s.joint for s in campaign.sweeps} - {s.joint for s in moved}
     return SweepFits(fits, noise, tuple(sorted(idle)))
 
@@ -132,16 +127,31 @@ def _fit(campaign: Campaign, sweep: Sweep, rows: np.ndarray, noise: Noise, estim
     return SweepFit(sweep, rows, fit)
 
 
-def _noise_of(fits: tuple[SweepFit, ...], noise: Noise) -> Noise:
-    chi_square = sum(f.fit.chi_square for f in fits)
-    freedom = sum(f.fit.degrees_of_freedom for f in fits)
-    stated = np.concatenate([f.sweep.covariance_m2[f.axis_rows] for f in fits])
-    return updated_noise(noise, stated, chi_square, freedom)
+def _noise_of(fits: tuple[SweepFit, ...]) -> Noise:
+    """The noise by the scatter of all sweeps about their axes."""
+    observed = stated = 0.0
+    components = freedom = 0
+    for found in fits:
+        fit, used = found.fit, found.fit.used
+        free = 2 * int(used.sum()) - (2 if fit.sliding else 4) - 2 * len(fit.radius_m)
+        scatter = fit.radial_m[used] ** 2 + (fit.tangential_m if fit.sliding else fit.axial_m)[used] ** 2
+        observed += float(scatter.sum()) * 2 * used.sum() / max(free, 1)
+        stated += _stated_variance(found, used)
+        components += 2 * int(used.sum())
+        freedom += free
+    return noise_from_scatter(observed, stated, components, freedom)
 
 
-def with_noise(found: SweepFits, noise: Noise) -> SweepFits:
-    """The same fits under another estimate of the noise."""
-    return replace(found, noise=noise)
+def _stated_variance(found: SweepFit, used: np.ndarray) -> float:
+    """Sum of the stated variances of the residuals' two components: all but the one along the path."""
+    covariance = found.sweep.covariance_m2[found.axis_rows][used]
+    line = found.fit.line
+    along = np.broadcast_to(line.direction, (len(covariance), 3))
+    if not found.fit.sliding:
+        along = cross(along, found.sweep.point_m[found.axis_rows][used] - line.point_m)
+        along = along / np.linalg.norm(along, axis=1)[:, None]
+    whole = np.trace(covariance, axis1=1, axis2=2)
+    return float(np.sum(whole - np.einsum("ki,kij,kj->k", along, covariance, along)))
 
 
 def active_from_zero(campaign: Campaign, commanded: Array) -> Array:

@@ -25,7 +25,7 @@ from core.axes.plane_circle import PlaneCircle, arc_start, plane_circle
 from core.axes.points import SweepPoints, require_points
 from core.axes.result import AxisFit, outlier_probabilities
 from core.errors import AxisUndefined, NotConverged
-from core.geometry import Array, Line, perpendicular_basis, rotation_about, wrap_angle
+from core.geometry import Array, Line, cross, perpendicular_basis, rotation_about, wrap_angle
 
 HUBER_LIMIT = 2.0
 """Residual length, in standard deviations, beyond which the robust fit reins a point in."""
@@ -300,7 +300,7 @@ def _local_frames(points: SweepPoints, state: _State) -> Array:
     outward /= np.maximum(np.sqrt(np.einsum("ij,ij->i", outward, outward)), 1e-300)[:, None]
     local = np.empty((points.count, 3, 3))
     local[:, 0], local[:, 1] = state.direction, outward
-    local[:, 2] = np.cross(state.direction, outward)
+    local[:, 2] = cross(state.direction, outward)
     return local
 
 

@@ -22,7 +22,7 @@ from core.axes.plane_circle import plane_circle
 from core.axes.points import SweepPoints, require_points
 from core.axes.result import AxisFit
 from core.errors import NotConverged
-from core.geometry import Array, Line, perpendicular_basis
+from core.geometry import Array, Line, cross, perpendicular_basis
 from core.phi_transforms import link_to, link_transform, phi_transform
 
 
@@ -87,7 +87,7 @@ def _equations(
     x_axis = np.array([1.0, 0.0, 0.0])
     zero = np.zeros((points.count, 3))
     moves = np.stack(
-        [zero - z_phi, zero - x_axis, -np.cross(x_axis, local), -np.cross(z_phi, local + arm)], axis=2
+        [zero - z_phi, zero - x_axis, -cross(x_axis, local), -cross(z_phi, local + arm)], axis=2
     )  # (k, 3, 4)
     if sliding:
         moves = moves[:, :, 2:]
@@ -167,9 +167,9 @@ def _covariance(
 def _axis_by_unknowns(phi_frame: Array, frame: Array, line: Line, basis: Array, sliding: bool) -> Array:
     """Derivatives of tilts and shifts at the axis point by a, b, alpha, theta (sliding: tilts by alpha, theta)."""
     z_phi, x_axis = phi_frame[:3, 2], frame[:3, 0]
-    tilts = np.stack([np.cross(x_axis, line.direction), np.cross(z_phi, line.direction)], axis=1)
+    tilts = np.stack([cross(x_axis, line.direction), cross(z_phi, line.direction)], axis=1)
     if sliding:
         return basis @ tilts
-    turns = np.stack([np.cross(x_axis, line.point_m - frame[:3, 3]), np.cross(z_phi, line.point_m - phi_frame[:3, 3])])
+    turns = np.stack([cross(x_axis, line.point_m - frame[:3, 3]), cross(z_phi, line.point_m - phi_frame[:3, 3])])
     shifts = np.stack([z_phi, x_axis, *turns], axis=1)
     return np.concatenate([basis @ np.column_stack([np.zeros((3, 2)), tilts]), basis @ shifts])

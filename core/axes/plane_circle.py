@@ -13,7 +13,7 @@ import numpy as np
 
 from core.axes.points import SweepPoints
 from core.errors import AxisUndefined
-from core.geometry import Array
+from core.geometry import Array, cross
 
 SIGNIFICANT_BEND = 3.0
 """An arc counts as bent where its curvature is that many standard deviations."""
@@ -64,7 +64,7 @@ def arc_start(points: SweepPoints) -> PlaneCircle:
     curvature = np.linalg.norm(bend)
     if curvature < SIGNIFICANT_BEND * _bend_noise(arc - middle, chord, s, coefficients):
         raise AxisUndefined("the points cannot be told from a straight line; expected a longer arc or less noise")
-    direction = np.cross(chord, bend / curvature)
+    direction = cross(chord, bend / curvature)
     centred, _ = _about_target_means(points)
     spread = np.sqrt(np.mean((centred @ np.stack([direction, bend / curvature, chord], axis=1)) ** 2, axis=0))
     return PlaneCircle(middle + bend / curvature**2, direction, spread)
