@@ -136,6 +136,11 @@ def predict(state: ArmState, seen: Observations, layout: Layout) -> Prediction:
     return Prediction(below[0], jacobian, by_net)
 
 
+def active_displacements(state: ArmState, seen: Observations) -> Array:
+    """Active displacements of all joints at every point, (m, n)."""
+    return _active(state, seen)[0]
+
+
 def net_displacements(state: ArmState, seen: Observations) -> Array:
     """Net displacements of all joints at every point, (m, n)."""
     return _net(state, _active(state, seen)[0])[0]

@@ -3,11 +3,11 @@
     campaign --> axes of all sweeps --> drives and couplings, joint by joint --> phi-model
                                              \\--> all points at once -----------> phi-model --> findings
 
-The joint-by-joint estimate is what the paper does and claims; the refinement of all points at once is what the data allow.
-Both are kept side by side.
+The joint-by-joint estimate is what the paper does and claims; the refinement of all points at once is what the data
+allow. Both are kept side by side.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from core.geometry import Array, invert
 from core.joint_by_joint import SweepMotion, joint_by_joint
 from core.measurements import Campaign
 from core.phi_convention import Convention, convention_for
-from core.phi_model import PhiModel, from_axes
+from core.phi_model import PhiModel, frames, from_axes
 from core.refinement import Refinement, refine
 from core.robot import Robot
 from core.sweep_fits import SweepFits, fit_sweeps
@@ -48,7 +48,7 @@ class Calibration:
     found: SweepFits
     """The axis of every sweep."""
     motions: tuple[SweepMotion, ...]
-    """What every sweep shows of its drive."""
+    """What every sweep shows of its drive, from the refined axes."""
     joint_by_joint: ArmEstimate
     refinement: Refinement
     findings: tuple[Finding, ...]
@@ -91,14 +91,14 @@ def calibrate(campaign: Campaign, estimator: str = "likelihood", reject: bool = 
     found = fit_sweeps(campaign, estimator, reject)
     convention, nominal = nominal_frames(campaign.robot, found)
     start, motions = joint_by_joint(campaign, found, convention, nominal)
-    refinement = refine(campaign, found, motions, start, convention, nominal)
+    refinement = refine(campaign, found, motions, start, convention, nominal, reject)
     return Calibration(
         campaign=campaign,
         estimator=estimator,
         convention=convention,
         nominal=nominal,
         found=found,
-        motions=motions,
+        motions=refinement.motions,
         joint_by_joint=start,
         refinement=refinement,
         findings=findings(campaign.robot, nominal, refinement.estimate),
@@ -127,10 +127,6 @@ def calibrated_robot(
     """
     if convention is None or nominal is None or estimate.geometry is None:
         raise NotConverged("the calibrated geometry needs a sweep of every joint")
-    from dataclasses import replace
-
-    from core.phi_model import frames
-
     n = robot.joint_count
     base, _ = from_axes(robot.axes_at_zero(), convention)
     ideal = frames(nominal, np.zeros(n), base)

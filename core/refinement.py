@@ -33,6 +33,7 @@ from core.noise import Noise, updated_noise
 from core.phi_convention import Convention
 from core.phi_model import PhiModel
 from core.phi_uncertainty import geometry_from_axes
+from core.refined_curves import Seen, refined_motions, with_curves
 from core.sweep_fits import SweepFits, active_from_zero
 
 SETTLED = 0.03
@@ -72,6 +73,8 @@ class Refinement:
     """Targets when every joint is at zero, in the instrument's frame, (t, 3); NaN: never seen in a sweep."""
     rest_covariance_m2: Array
     """(t, 3, 3)."""
+    motions: tuple[SweepMotion, ...]
+    """What every sweep shows of its drive, from the refined axes; displacement counts from zero."""
     residuals: PointResiduals
     noise: Noise
     degrees_of_freedom: int
@@ -88,8 +91,9 @@ def refine(
     start: ArmEstimate,
     convention: Convention | None,
     nominal: PhiModel | None,
+    reject: bool = True,
 ) -> Refinement:
-    """Refine a joint-by-joint estimate on all points of all sweeps.
+    """Refine a joint-by-joint estimate on all points of all sweeps; ``reject``: leave out points that stand out.
 
     Raises:
         NotConverged: Gauss-Newton did not settle; the joint-by-joint estimate stands.
@@ -103,7 +107,7 @@ def refine(
         prediction = solved.prediction
         better = updated_noise(noise, problem.stated_m2[used], solved.chi_square, solved.degrees_of_freedom)
         more = problem.arc_excess(prediction, better, used)
-        worst = _worst_outlier(solved, used)
+        worst = _worst_outlier(solved, used) if reject else None
         growth = better.rms_m(problem.stated_m2[used]) / noise.rms_m(problem.stated_m2[used])
         noise, settled = better, np.allclose(more, excess, rtol=0.05, atol=1e-9) and abs(growth - 1) < SETTLED
         excess = more
@@ -113,7 +117,7 @@ def refine(
             used = used.copy()
             used[worst] = False
     solved = replace(solved, covariance=solved.covariance * growth**2)
-    return problem.result(campaign, state, solved, noise, excess, used, start, convention, nominal)
+    return problem.result(campaign, state, solved, noise, excess, used, start, motions, convention, nominal)
 
 
 @dataclass(frozen=True)
@@ -251,12 +255,20 @@ class _Problem:
         excess: Array,
         used: np.ndarray,
         start: ArmEstimate,
+        motions: tuple[SweepMotion, ...],
         convention: Convention | None,
         nominal: PhiModel | None,
     ) -> Refinement:
+        seen = Seen(self.seen, solved.prediction, noise.covariance(self.stated_m2), used)
+        motions = refined_motions(motions, state, seen)
         drives = self._function_fits(start.transmissions, state.transmissions, self.layout.transmissions, solved)
         couplings = self._function_fits(start.couplings, state.couplings, self.layout.couplings, solved)
-        covariance = self._axis_covariance(solved.covariance, len(state.axes))
+        n, home = len(state.axes), self.seen.home
+        own = tuple(tuple(m.curve for m in motions if m.found.sweep.joint == j) for j in range(1, n + 1))
+        passive = tuple(tuple(m.passive for m in motions if m.passive and m.found.sweep.joint == j) for j in range(n))
+        drives = with_curves(drives, own, home, np.ones(n))
+        couplings = with_curves(couplings, passive, False, campaign.robot.coupling_gains)
+        covariance = self._axis_covariance(solved.covariance, n)
         geometry = None
         if convention is not None and nominal is not None:
             geometry = geometry_from_axes(state.axes, convention, covariance, nominal)
@@ -276,6 +288,7 @@ class _Problem:
             estimate,
             rest,
             rest_covariance,
+            motions,
             self._residuals(state, solved, used),
             noise,
             solved.degrees_of_freedom,
