@@ -193,7 +193,7 @@ def constants_table(calibration: Calibration) -> Table:
                         "joint_by_joint_std": first.std[k] if same else np.nan,
                     }
                 )
-    columns = ["kind", "joint", "family", "constant", "unit", "value", "std", "joint_by_joint", "joint_by_joint_std"]
+    columns = _columns("kind joint family constant unit value std joint_by_joint joint_by_joint_std")
     return Table("constants", "Constants of the functions", pd.DataFrame(rows, columns=columns))
 
 
@@ -219,7 +219,7 @@ def candidates_table(calibration: Calibration) -> Table:
                         "chosen": candidate.name == fit.form.name,
                     }
                 )
-    columns = ["kind", "joint", "family", "constants", "rms", "unit", "chi_square", "probability", "chosen"]
+    columns = _columns("kind joint family constants rms unit chi_square probability chosen")
     return Table("candidates", "Families that were compared", pd.DataFrame(rows, columns=columns))
 
 
@@ -240,7 +240,7 @@ def zeros_table(calibration: Calibration) -> Table:
                 "unit": unit,
             }
         )
-    columns = ["joint", "reading_at_marks", "command_for_zero", "offset", "offset_std", "unit"]
+    columns = _columns("joint reading_at_marks command_for_zero offset offset_std unit")
     note = (
         "Displacement counts from the arm's marks."
         if campaign.home is not None
@@ -267,7 +267,7 @@ def findings_table(calibration: Calibration) -> Table:
                 "significant": finding.significant,
             }
         )
-    columns = ["text", "frame", "joint", "parameter", "deviation", "std", "unit", "significance", "significant"]
+    columns = _columns("text frame joint parameter deviation std unit significance significant")
     frame = pd.DataFrame(rows, columns=columns).astype({"frame": "Int64", "joint": "Int64"})
     return Table("findings", "Findings", frame, "Significant: more than two standard uncertainties off the design.")
 
@@ -309,7 +309,7 @@ def targets_table(calibration: Calibration) -> Table:
                 "std_mm": std,
             }
         )
-    columns = ["target", "link", "x_mm", "y_mm", "z_mm", "std_mm"]
+    columns = _columns("target link x_mm y_mm z_mm std_mm")
     return Table("targets", "Targets at zero", pd.DataFrame(rows, columns=columns))
 
 
@@ -347,12 +347,16 @@ def sweep_rows(calibration: Calibration) -> Iterator[tuple[SweepFit, slice]]:
         at += count
 
 
+def _columns(names: str) -> list[str]:
+    return names.split()
+
+
 def constant_unit(fit: FunctionFit, name: str) -> str:
     """The unit of a constant: amplitudes of periodic errors are angles, everything else is a plain number."""
     return "rad" if name[0] in "sc" and fit.form.name != "arctangent" else "1"
 
 
-_FUNCTION_COLUMNS = ["family", "formula", "rms_before", "rms_after", "unit", "reason"]
+_FUNCTION_COLUMNS = ("family", "formula", "rms_before", "rms_after", "unit", "reason")
 
 
 def _function_row(fit: FunctionFit, slides: bool) -> dict[str, object]:
