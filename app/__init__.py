@@ -1,0 +1,1 @@
+"""What a person meets: the command line, the report and the dashboard. It computes nothing; ``core`` does."""

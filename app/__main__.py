@@ -1,0 +1,131 @@
+"""The command line: ``trueaxis COMMAND ...``.
+
+Exit status 0: done; 2: what was given is wrong, one sentence on standard error says what; 1: anything else.
+Nothing but the standard library is imported before a command is known, so that help is there at once.
+"""
+
+import argparse
+import os
+import sys
+import warnings
+from collections.abc import Sequence
+from importlib import import_module
+from types import ModuleType
+
+from core.errors import InputError, TrueaxisError
+from core.version import VERSION
+
+DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+COMMANDS = {
+    "calibrate": "calibrate an arm from its single-axis sweeps: JSON, report and tables",
+    "simulate": "make a campaign by measuring a simulated arm, with faults if you like",
+    "axis": "find one joint axis from a plain CSV of points",
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command that the arguments ask for (default: those of the process) and return the exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if sys.stdout is not None and hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")
+    try:
+        try:
+            return _run(given)
+        finally:
+            if sys.stdout is not None:
+                sys.stdout.flush()
+    except BrokenPipeError:
+        _silence_stdout()
+        return FAILED
+    except OSError as error:
+        _silence_stdout()
+        return _complain(f"standard output cannot be written: {error.strerror or error}", FAILED)
+
+
+def _run(given: list[str]) -> int:
+    """Run a command; whatever goes wrong becomes one sentence and an exit status."""
+    try:
+        with warnings.catch_warnings():
+            if "--debug" not in given and not sys.warnoptions:
+                warnings.simplefilter("ignore", RuntimeWarning)
+            return _dispatch(given)
+    except BrokenPipeError:
+        raise
+    except KeyboardInterrupt:
+        return _complain("interrupted", INTERRUPTED)
+    except InputError as error:
+        return _complain(str(error), WRONG_INPUT)
+    except TrueaxisError as error:
+        return _complain(str(error), FAILED)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename is not None else ""
+        return _complain(f"{where}{error.strerror or error}", WRONG_INPUT)
+    except Exception as error:
+        if "--debug" in given:
+            raise
+        what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        return _complain(f"unexpected error, {what}; run again with --debug for the trace", FAILED)
+
+
+def _dispatch(given: list[str]) -> int:
+    chosen = next((word for word in given if not word.startswith("-")), None)
+    command = import_module(f"app.commands.{chosen}") if chosen in COMMANDS else None
+    parser = _parser(chosen, command)
+    try:
+        arguments = parser.parse_args(given)
+    except SystemExit as ended:
+        return int(ended.code or 0)
+    if command is None:
+        parser.print_help()
+    else:
+        command.run(arguments)
+    return DONE
+
+
+def _parser(chosen: str | None, command: ModuleType | None) -> argparse.ArgumentParser:
+    """The parser of all commands; only the chosen one says what options it takes."""
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument(
+        "--debug", action="store_true", default=argparse.SUPPRESS, help="show the trace of an unexpected error"
+    )
+    parser = argparse.ArgumentParser(
+        prog="trueaxis",
+        description="Calibrate a robot arm from single-axis measurements.",
+        parents=[common],
+        formatter_class=lambda prog: argparse.HelpFormatter(prog, max_help_position=16),
+    )
+    parser.add_argument("--version", action="version", version=f"trueaxis {VERSION}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", dest="command")
+    for name, help_text in COMMANDS.items():
+        sentence = f"{help_text[0].upper()}{help_text[1:]}."
+        one = commands.add_parser(
+            name,
+            help=help_text,
+            description=sentence,
+            parents=[common],
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        if name == chosen and command is not None:
+            command.configure(one)
+    return parser
+
+
+def _complain(sentence: str, status: int) -> int:
+    print(f"trueaxis: {' '.join(sentence.splitlines())}", file=sys.stderr)
+    return status
+
+
+def _silence_stdout() -> None:
+    """Let what is still buffered go nowhere, so that nothing fails again when the process ends."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, sys.stdout.fileno())
+    except (OSError, ValueError):
+        pass
+    finally:
+        os.close(nowhere)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

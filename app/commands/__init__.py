@@ -1,0 +1,1 @@
+"""One command a file. Each offers ``configure(parser)`` and ``run(arguments)`` and is imported when it is asked for."""
