@@ -158,5 +158,5 @@ def _rejections(campaign: Campaign, refinement: Refinement) -> tuple[Rejection, 
             residual_m=float(np.linalg.norm(residuals.residual_m[k])),
             reason="stands out of the scatter of its sweep: less than one chance in a thousand that noise does this",
         )
-        for k in np.flatnonzero(~residuals.used)
+        for k in np.flatnonzero(~residuals.used & residuals.knowable)
     )

@@ -10,9 +10,14 @@ over the constants of f, eps_s, and one free number of each sweep: where it bega
 since the first stop is seen) or what it began with (``level``, couplings: only the passive motion since the first stop
 is seen). f0 is f(0) where the arm's marks define zero (``home``), else 0.
 
-Families compete by the Bayesian information criterion (Schwarz 1978, doi 10.1214/aos/1176344136), the logarithm of the
-evidence under a prior worth one observation: chi^2 + p ln(stops), less twice the logarithm of the prior odds. It asks a
-constant to earn ln(stops) in chi^2, and so does not over-fit; what it cannot tell apart is said.
+Families compete by their evidence (marginal likelihood, by Laplace's approximation) under a Gaussian prior about a
+perfect drive, of the size that errors of real drives have (``MotionForm.prior_std``):
+
+    -2 ln Z = chi^2 + penalty at the best constants + ln det(1 + S F S) - 2 ln(prior odds)
+
+with S the prior's standard deviations and F the information of the constants. A constant that the stops cannot pin down
+costs as much as it gains, so that nothing is over-fitted (MacKay 1992, doi 10.1162/neco.1992.4.3.415). Of families that
+the stops cannot tell apart the one with the fewest constants is taken, and it is said. The prior takes part in the choice alone: the chosen family is then fitted without it.
 """
 
 from dataclasses import dataclass, replace
@@ -22,6 +27,9 @@ import numpy as np
 from core.errors import NotConverged
 from core.geometry import Array
 from core.motion_forms import MotionForm
+
+TELLING = 0.1
+"""A family is ruled out where it is less probable than this share of the best."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +95,7 @@ def fit_function(
     home: bool = False,
     level: bool = False,
     nominal_slope: float = 1.0,
+    prior: bool = False,
 ) -> FunctionFit:
     """Fit one family to the curves of one joint, by Gauss-Newton.
 
@@ -96,6 +105,7 @@ def fit_function(
         home: whether y counts from the value at zero displacement, f(0).
         level: whether a sweep's free number is the value at its first stop, not the displacement.
         nominal_slope: slope of the function of a perfect drive, for the error before the fit.
+        prior: whether the constants are held near those of a perfect drive, as the evidence supposes.
 
     Raises:
         NotConverged: the iteration did not end.
@@ -110,6 +120,11 @@ def fit_function(
         normal, gradient, chi_square, residual = _normal_equations(
             form, curves, (home, level), coefficients, start, axis
         )
+        if prior:
+            precision = 1.0 / form.prior_std() ** 2
+            normal[range(p), range(p)] += precision
+            gradient[:p] -= precision * (coefficients - form.start())
+            chi_square += float(precision @ (coefficients - form.start()) ** 2)
         scale = 1.0 / np.sqrt(np.diag(normal))
         step = np.linalg.lstsq(normal * scale[:, None] * scale, gradient * scale, rcond=1e-14)[0] * scale
         coefficients, start = coefficients + step[:p], start + step[p : p + s]
@@ -141,25 +156,38 @@ def choose_function(
         curves, home, level, nominal_slope: as for ``fit_function``.
     """
     stops = sum(len(c.y) for c in curves)
+    options = {"home": home, "level": level, "nominal_slope": nominal_slope}
     fits = []
     for form, odds in forms:
         if len(form.coefficient_names) + len(curves) >= stops:
             continue
         try:
-            fits.append((fit_function(form, curves, home=home, level=level, nominal_slope=nominal_slope), odds))
+            held = fit_function(form, curves, prior=True, **options)
+            fits.append((fit_function(form, curves, **options), _misfit(held) - 2 * np.log(odds)))
         except (NotConverged, np.linalg.LinAlgError):
             continue
     if not fits:
         raise NotConverged(f"none of {', '.join(f.name for f, _ in forms)} could be fitted to {stops} stops")
-    score = np.array([fit.chi_square + len(fit.coefficients) * np.log(stops) - 2 * np.log(odds) for fit, odds in fits])
+    score = np.array([misfit for _, misfit in fits])
     probability = np.exp(-0.5 * (score - score.min()))
     probability /= probability.sum()
     candidates = tuple(
         Candidate(fit.form.name, len(fit.coefficients), fit.rms_after, fit.chi_square, float(chance))
         for (fit, _), chance in zip(fits, probability, strict=True)
     )
-    best = fits[int(np.argmax(probability))][0]
-    return _with_choice(best, candidates)
+    possible = [k for k in range(len(fits)) if probability[k] > TELLING * probability.max()]
+    best = min(possible, key=lambda k: (candidates[k].constants, -probability[k]))
+    others = [candidates[k] for k in range(len(fits)) if k != best]
+    tied = [candidates[k] for k in possible if k != best]
+    return replace(fits[best][0], candidates=candidates, reason=_reason(candidates[best], tied, others))
+
+
+def _misfit(held: FunctionFit) -> float:
+    """-2 ln of the evidence of a family, from its fit under the prior."""
+    spread = held.form.prior_std()
+    if len(spread) == 0:
+        return held.chi_square
+    return held.chi_square - float(np.linalg.slogdet(held.covariance / np.outer(spread, spread))[1])
 
 
 def _normal_equations(
@@ -223,19 +251,13 @@ def _function_fit(
     )
 
 
-def _with_choice(fit: FunctionFit, candidates: tuple[Candidate, ...]) -> FunctionFit:
-    rivals = sorted((c for c in candidates if c.name != fit.form.name), key=lambda c: -c.probability)
-    mine = next(c for c in candidates if c.name == fit.form.name)
-    if not rivals:
-        reason = "the only family that these stops can carry"
-    elif rivals[0].probability > 0.05:
-        reason = (
-            f"most probable of {len(candidates)} families ({mine.probability:.0%}), but this sweep cannot rule out "
-            f"{rivals[0].name} ({rivals[0].probability:.0%})"
-        )
-    else:
-        odds = mine.probability / max(rivals[0].probability, 1e-300)
-        reason = (
-            f"most probable of {len(candidates)} families, {min(odds, 1e6):.3g} times more so than {rivals[0].name}"
-        )
-    return replace(fit, candidates=candidates, reason=reason)
+def _reason(chosen: Candidate, tied: list[Candidate], others: list[Candidate]) -> str:
+    """Why a family was chosen, in words."""
+    if not others:
+        return "the only family that these stops can carry"
+    if tied:
+        names = ", ".join(f"{c.name} {c.probability:.0%}" for c in sorted(tied, key=lambda c: -c.probability))
+        return f"simplest of the families that these stops cannot tell apart ({chosen.name} {chosen.probability:.0%}, {names})"
+    rival = max(others, key=lambda c: c.probability)
+    odds = min(chosen.probability / max(rival.probability, 1e-300), 1e6)
+    return f"most probable of {len(others) + 1} families, {odds:.3g} times more so than {rival.name}"

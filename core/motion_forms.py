@@ -33,6 +33,11 @@ from numpy.typing import ArrayLike
 from core.errors import InputError
 from core.geometry import Array, wrap_angle
 
+PERIODIC_STD_RAD = 0.03
+"""Size of periodic errors to be expected of a drive: the paper's run up to 0.04 rad."""
+RATIO_STD = 0.01
+"""Size of ratio errors to be expected."""
+
 
 class MotionForm(ABC):
     """One family: what it is called, its constants, its value and its derivatives."""
@@ -49,6 +54,10 @@ class MotionForm(ABC):
     def evaluate(self, x: Array, coefficients: Array) -> tuple[Array, Array, Array]:
         """Value (m,), slope with respect to x (m,), gradient with respect to the constants (m, p)."""
 
+    @abstractmethod
+    def prior_std(self) -> Array:
+        """How far the constants of real drives are from a perfect one, roughly, (p,): the prior of the evidence."""
+
     def constants(self) -> dict[str, float]:
         """Numbers of the formula that are given and not fitted, by name."""
         return {}
@@ -63,6 +72,9 @@ class Direct(MotionForm):
     formula = "x"
 
     def start(self) -> Array:
+        return np.zeros(0)
+
+    def prior_std(self) -> Array:
         return np.zeros(0)
 
     def evaluate(self, x: Array, coefficients: Array) -> tuple[Array, Array, Array]:
@@ -88,6 +100,9 @@ class Proportional(MotionForm):
 
     def start(self) -> Array:
         return np.array([self.gain])
+
+    def prior_std(self) -> Array:
+        return np.array([RATIO_STD * abs(self.gain)])
 
     def evaluate(self, x: Array, coefficients: Array) -> tuple[Array, Array, Array]:
         return coefficients[0] * x, np.full_like(x, coefficients[0]), x[:, None]
@@ -118,6 +133,9 @@ class Harmonics(MotionForm):
     def start(self) -> Array:
         return np.zeros(2 * self.orders)
 
+    def prior_std(self) -> Array:
+        return np.repeat(PERIODIC_STD_RAD / np.arange(1, self.orders + 1), 2)
+
     def evaluate(self, x: Array, coefficients: Array) -> tuple[Array, Array, Array]:
         gradient, turned = np.empty((len(x), 2 * self.orders)), np.empty((len(x), 2 * self.orders))
         for k in range(1, self.orders + 1):
@@ -141,6 +159,9 @@ class DriveGear(MotionForm):
     def start(self) -> Array:
         return np.zeros(2)
 
+    def prior_std(self) -> Array:
+        return np.full(2, PERIODIC_STD_RAD)
+
     def evaluate(self, x: Array, coefficients: Array) -> tuple[Array, Array, Array]:
         sine, cosine = np.sin(x / self.ratio), np.cos(x / self.ratio)
         s, c = coefficients
@@ -162,6 +183,9 @@ class CouplingGear(MotionForm):
 
     def start(self) -> Array:
         return np.zeros(2)
+
+    def prior_std(self) -> Array:
+        return np.full(2, PERIODIC_STD_RAD)
 
     def evaluate(self, x: Array, coefficients: Array) -> tuple[Array, Array, Array]:
         sine, cosine = np.sin(self.ratio * x), np.cos(self.ratio * x)
@@ -185,6 +209,9 @@ class Arctangent(MotionForm):
 
     def start(self) -> Array:
         return np.array([self.gain, 0.0, 0.0, 0.0])
+
+    def prior_std(self) -> Array:
+        return np.array([0.02, 0.2, 0.2, 0.02])
 
     def evaluate(self, x: Array, coefficients: Array) -> tuple[Array, Array, Array]:
         n0, n1, d1, d2 = coefficients

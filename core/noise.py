@@ -61,25 +61,3 @@ def noise_from_scatter(observed_m2: float, stated_m2: float, components: int, de
     if ratio >= 1:
         return Noise(True, 1.0, float(np.sqrt((observed_m2 - stated_m2) / components)))
     return Noise(True, max(ratio, 1e-12), 0.0)
-
-
-def updated_noise(noise: Noise, stated_m2: Array, chi_square: float, degrees_of_freedom: float) -> Noise:
-    """The noise under which a fit's chi-square would equal its degrees of freedom.
-
-    Args:
-        noise: the noise with which the fit was made.
-        stated_m2: stated covariances of the fitted points, (k, 3, 3).
-        chi_square, degrees_of_freedom: of the fit.
-    """
-    if degrees_of_freedom <= 0:
-        return noise
-    ratio = chi_square / degrees_of_freedom
-    if degrees_of_freedom < FEWEST_FREEDOMS and noise.stated and abs(ratio - 1) < 3 * np.sqrt(2 / degrees_of_freedom):
-        return noise
-    if not noise.stated:
-        return Noise(False, added_m=max(noise.added_m * float(np.sqrt(ratio)), 1e-12))
-    wanted = ratio * noise.rms_m(stated_m2) ** 2
-    alone = Noise(True).rms_m(stated_m2) ** 2
-    if wanted >= alone:
-        return Noise(True, 1.0, float(np.sqrt(wanted - alone)))
-    return Noise(True, wanted / alone, 0.0)

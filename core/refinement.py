@@ -29,7 +29,7 @@ from core.geometry import Array, cross
 from core.joint_by_joint import SweepMotion, drive_functions, offset_std
 from core.measurements import Campaign
 from core.motion_forms import MotionFunction
-from core.noise import Noise, updated_noise
+from core.noise import Noise, noise_from_scatter
 from core.phi_convention import Convention
 from core.phi_model import PhiModel
 from core.phi_uncertainty import geometry_from_axes
@@ -60,6 +60,8 @@ class PointResiduals:
     """Along the arc, (m,); for a sliding joint the way along is ``axial_m``."""
     used: np.ndarray
     """Fitted, boolean, (m,)."""
+    knowable: np.ndarray
+    """False for points that also moved with a joint of which there is no sweep; they are not fitted, (m,)."""
     outlier_probability: Array
     """(m,)."""
 
@@ -99,13 +101,13 @@ def refine(
         NotConverged: Gauss-Newton did not settle; the joint-by-joint estimate stands.
     """
     problem = _Problem.of(campaign, found, start)
-    used = np.concatenate([f.used for f in found.fits])
+    used = np.concatenate([f.used for f in found.fits]) & problem.knowable
     state, noise, excess = problem.start_state(start), found.noise, np.zeros(campaign.robot.joint_count)
     prediction = predict(state, problem.seen, problem.layout)
     for _ in range(12):
         state, solved = problem.solve(state, prediction, problem.covariance(noise, excess, prediction), used)
         prediction = solved.prediction
-        better = updated_noise(noise, problem.stated_m2[used], solved.chi_square, solved.degrees_of_freedom)
+        better = problem.noise(solved, used)
         more = problem.arc_excess(prediction, better, used)
         worst = _worst_outlier(solved, used) if reject else None
         growth = better.rms_m(problem.stated_m2[used]) / noise.rms_m(problem.stated_m2[used])
@@ -116,7 +118,7 @@ def refine(
         if worst is not None:
             used = used.copy()
             used[worst] = False
-    solved = replace(solved, covariance=solved.covariance * growth**2)
+    solved = replace(solved, covariance=solved.covariance * solved.chi_square / solved.degrees_of_freedom)
     return problem.result(campaign, state, solved, noise, excess, used, start, motions, convention, nominal)
 
 
@@ -144,6 +146,8 @@ class _Problem:
     layout: Layout
     targets: np.ndarray
     """Indices of the campaign's targets that are seen, (t,)."""
+    knowable: np.ndarray
+    """False for points that also moved with a joint of which there is no sweep, boolean, (m,)."""
 
     @staticmethod
     def of(campaign: Campaign, found: SweepFits, start: ArmEstimate) -> "_Problem":
@@ -161,15 +165,20 @@ class _Problem:
             sliding=campaign.robot.sliding,
             home=campaign.home is not None,
         )
+        joint = np.concatenate([np.full(len(s.rows), s.joint) for s in sweeps])
+        coupled_on = np.array(
+            [c is not None and c.target not in found.swept for c in map(campaign.robot.coupling_from, joint)]
+        )
         state = _state(start, np.zeros((len(targets), 3)))
         coupled = np.array([fit is not None for fit in start.couplings])
         return _Problem(
             seen,
             np.concatenate([s.covariance_m2 for s in sweeps]),
             np.concatenate([s.rows for s in sweeps]),
-            np.concatenate([np.full(len(s.rows), s.joint) for s in sweeps]),
+            joint,
             Layout.of(state, campaign.robot.sliding, swept, coupled),
             targets,
+            ~(coupled_on & (seen.link > joint)),
         )
 
     def start_state(self, start: ArmEstimate) -> ArmState:
@@ -194,6 +203,14 @@ class _Problem:
             out = out + along[:, :, None] * along[:, None, :]
         return out
 
+    def noise(self, solved: _Solved, used: np.ndarray) -> Noise:
+        """The noise by the scatter of the points about the arm."""
+        residual = (self.seen.point_m - solved.prediction.point_m)[used]
+        components = 3 * len(residual)
+        observed = float(np.sum(residual**2)) * components / solved.degrees_of_freedom
+        stated = float(np.sum(np.trace(self.stated_m2[used], axis1=1, axis2=2)))
+        return noise_from_scatter(observed, stated, components, solved.degrees_of_freedom)
+
     def solve(
         self, state: ArmState, prediction: Prediction, covariance: Array, used: np.ndarray
     ) -> tuple[ArmState, _Solved]:
@@ -201,12 +218,14 @@ class _Problem:
         whitener = np.linalg.inv(np.linalg.cholesky(covariance)) * used[:, None, None]
         residual, cost = self._whitened(whitener, prediction)
         freedom = max(3 * int(used.sum()) - self.layout.size, 1)
+        reach = float(np.abs(self.seen.point_m).max())
+        rounding = float(np.sum((1e-14 * reach * np.diagonal(whitener, axis1=1, axis2=2)) ** 2))
         for _ in range(50):
             matrix = (whitener @ prediction.jacobian).reshape(-1, self.layout.size)
             inverse, lost = _inverse(matrix.T @ matrix)
             gradient = matrix.T @ residual
             step = inverse @ gradient
-            if gradient @ step <= 1e-6 * cost / freedom + 1e-20:
+            if gradient @ step <= 1e-6 * cost / freedom + rounding:
                 probability = self._probability(matrix, inverse, residual, cost, used)
                 return state, _Solved(prediction, inverse, cost, freedom + lost, lost, probability)
             for _ in range(30):
@@ -356,6 +375,7 @@ class _Problem:
             np.where(slides, across, radial),
             np.where(slides, 0.0, tangential),
             used,
+            self.knowable,
             solved.probability,
         )
 

@@ -17,7 +17,7 @@ last step gives the covariance. The angles are incidental parameters, so the bou
 Kanatani (1998, doi 10.1109/34.667887) and Chernov and Lesort (2004, doi 10.1016/j.csda.2003.10.008).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -96,12 +96,19 @@ def fit_rotary_axis(points: SweepPoints, robust: bool = False) -> AxisFit:
     shared = points.stop is not None
     unknown = 4 + 2 * points.target_count + (points.target_count - 1 if shared else 0)
     require_points(points, unknown, 2, 4)
-    return _result(points, *_refine(points, _best_start(points, robust), robust))
+    state = _best_start(points, robust)
+    if points.covariance_m2 is not None:
+        state = _refine(points, state, robust, weights_of=state, tolerance=1e-3)[0]
+    return _result(points, *_refine(points, state, robust, weights_of=state))
 
 
 def _best_start(points: SweepPoints, robust: bool) -> _State:
-    """A state near the optimum: in closed form, or fitted to fewer points, or the better of two where arcs are flat."""
-    many = points.count > SUBSET
+    """A state near the optimum: in closed form, or fitted to fewer points, or the better of two where arcs are flat.
+
+    Noise is taken as the same in all directions here; skew noise needs to know where the axis is.
+    """
+    many, skew = points.count > SUBSET, points.covariance_m2 is not None
+    points = replace(points, covariance_m2=None)
     if many:
         points = points.only(np.linspace(0, points.count - 1, SUBSET).astype(int))
     flat = plane_circle(points)
@@ -110,7 +117,7 @@ def _best_start(points: SweepPoints, robust: bool) -> _State:
     if sagitta < min(FLAT_ARC * across, SHORT_ARC * chord):
         states.append(_state_at(points, arc_start(points)))
     if len(states) == 1 and not many:
-        return states[0]
+        return _refine(points, states[0], robust, tolerance=1e-2)[0] if skew else states[0]
     found = [refined for state in states if (refined := _try_refine(points, state, robust))]
     if not found:
         raise NotConverged("the fit of a joint axis did not converge in 100 steps")
@@ -125,36 +132,41 @@ def _try_refine(points: SweepPoints, state: _State, robust: bool) -> tuple[_Stat
         return None
 
 
-def _refine(points: SweepPoints, state: _State, robust: bool) -> tuple[_State, _Rows, Array | None]:
-    """Gauss-Newton with step halving, from a state to the least sum of squares."""
-    rows = _rows(points, state)
+def _refine(
+    points: SweepPoints, state: _State, robust: bool, weights_of: _State | None = None, tolerance: float = 1e-7
+) -> tuple[_State, _Rows, Array | None]:
+    """Gauss-Newton with step halving, from a state to the least sum of squares.
+
+    Skew noise is resolved into axial, radial and tangential parts as they are at ``weights_of``, and held so: weights
+    that turned with the axis would be left out by the derivatives.
+    """
+    rows = _rows(points, state, weights_of)
     freedom = max(points.count, 1)
     for _ in range(100):
-        weight = _huber_weights(rows, points) if robust else None
+        weight = _huber_weights(rows) if robust else None
         normal, gradient = rows.normal_equations(weight)
         step = -_solve_normal(normal, gradient)
         promise = -float(gradient @ step)
         settled = rows.cost / freedom + _rounding(points, state)
-        if promise <= 1e-7 * settled:
+        if promise <= tolerance * settled:
             return state, rows, weight
         before = state
-        state, rows = _descend(points, state, rows, step, weight)
+        state, rows = _descend(points, state, rows, step, weight, weights_of)
         if state is before and promise <= 1e-3 * settled:
             return state, rows, weight
     raise NotConverged("the fit of a joint axis did not converge in 100 steps")
 
 
 def _descend(
-    points: SweepPoints, state: _State, rows: _Rows, step: Array, weight: Array | None
+    points: SweepPoints, state: _State, rows: _Rows, step: Array, weight: Array | None, weights_of: _State | None
 ) -> tuple[_State, _Rows]:
     """Take the step, or the largest half, quarter, ... of it that does not raise the weighted sum of squares."""
     cost = _weighted_cost(rows, weight)
     for _ in range(40):
         new_state = _moved(state, step)
-        # Weights are held while the step is judged: they turn with the axis, and the derivatives leave that out.
-        new_rows = _rows(points, new_state, weights_of=state)
+        new_rows = _rows(points, new_state, weights_of)
         if _weighted_cost(new_rows, weight) <= cost * (1 + 1e-12):
-            return new_state, new_rows if points.covariance_m2 is None else _rows(points, new_state)
+            return new_state, new_rows
         step = step / 2
     return state, rows
 
@@ -222,7 +234,7 @@ def _moved(state: _State, step: Array) -> _State:
     )
 
 
-def _rows(points: SweepPoints, state: _State, weights_of: _State | None = None) -> _Rows:
+def _rows(points: SweepPoints, state: _State, weights_of: _State | None) -> _Rows:
     """Residuals and derivatives by (tilt 1, tilt 2, shift 1, shift 2, heights, radii, azimuths)."""
     e1, e2 = perpendicular_basis(state.direction)
     basis = np.stack([e1, e2, state.direction])
@@ -325,7 +337,7 @@ def _without_stop_angles(stop: np.ndarray, arc: Array, matrix: Array, residual: 
     return columns[:, :, :-1], columns[:, :, -1]
 
 
-def _huber_weights(rows: _Rows, points: SweepPoints) -> Array:
+def _huber_weights(rows: _Rows) -> Array:
     """Weights that rein in long residuals; scale from their median, as the stated noise is not to be trusted here."""
     length = np.sqrt(np.einsum("ij,ij->i", rows.residual, rows.residual))
     # The median length of two unit normal components is sqrt(2 ln 2).
