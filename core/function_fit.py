@@ -17,7 +17,8 @@ perfect drive, of the size that errors of real drives have (``MotionForm.prior_s
 
 with S the prior's standard deviations and F the information of the constants. A constant that the stops cannot pin down
 costs as much as it gains, so that nothing is over-fitted (MacKay 1992, doi 10.1162/neco.1992.4.3.415). Of families that
-the stops cannot tell apart the one with the fewest constants is taken, and it is said. The prior takes part in the choice alone: the chosen family is then fitted without it.
+the stops cannot tell apart the one with the fewest constants is taken, and it is said. The prior takes part in the
+choice alone: the chosen family is then fitted without it.
 """
 
 from dataclasses import dataclass, replace
@@ -257,7 +258,8 @@ def _reason(chosen: Candidate, tied: list[Candidate], others: list[Candidate]) -
         return "the only family that these stops can carry"
     if tied:
         names = ", ".join(f"{c.name} {c.probability:.0%}" for c in sorted(tied, key=lambda c: -c.probability))
-        return f"simplest of the families that these stops cannot tell apart ({chosen.name} {chosen.probability:.0%}, {names})"
+        mine = f"{chosen.name} {chosen.probability:.0%}"
+        return f"simplest of the families that these stops cannot tell apart ({mine}, {names})"
     rival = max(others, key=lambda c: c.probability)
     odds = min(chosen.probability / max(rival.probability, 1e-300), 1e6)
     return f"most probable of {len(others) + 1} families, {odds:.3g} times more so than {rival.name}"
