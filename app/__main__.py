@@ -59,8 +59,9 @@ def _run(given: list[str]) -> int:
     except TrueaxisError as error:
         return _complain(str(error), FAILED)
     except OSError as error:
-        where = f"{error.filename}: " if error.filename is not None else ""
-        return _complain(f"{where}{error.strerror or error}", WRONG_INPUT)
+        if error.filename is None:
+            raise
+        return _complain(f"{error.filename}: {error.strerror or error}", WRONG_INPUT)
     except Exception as error:
         if "--debug" in given:
             raise
