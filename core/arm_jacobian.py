@@ -126,7 +126,7 @@ def predict(state: ArmState, seen: Observations, layout: Layout) -> Prediction:
             break
         by_net[:, :, i] = _by_net(state.axes[i], bool(seen.sliding[i]), below[i], frame) * rides[:, None]
         if layout.axes[i] is not None:
-            columns = _by_axis(state.axes[i], bool(seen.sliding[i]), below[i], below[i + 1], rotations[i], net[:, i])
+            columns = by_axis(state.axes[i], bool(seen.sliding[i]), below[i], below[i + 1], rotations[i], net[:, i])
             jacobian[:, :, layout.axes[i]] = np.einsum("mij,mjk->mik", frame, columns) * rides[:, None, None]
         frame = frame @ rotations[i]
     _add_functions(jacobian, layout, by_net, slopes, by_constants, by_coupling)
@@ -144,6 +144,30 @@ def active_displacements(state: ArmState, seen: Observations) -> Array:
 def net_displacements(state: ArmState, seen: Observations) -> Array:
     """Net displacements of all joints at every point, (m, n)."""
     return _net(state, _active(state, seen)[0])[0]
+
+
+def by_axis(line: Line, sliding: bool, after: Array, before: Array, rotation: Array, net: Array) -> Array:
+    """Derivatives of moved points by tilts and shifts of the axis they moved about, (m, 3, 4); sliding: (m, 3, 2).
+
+    Args:
+        line, sliding: the axis.
+        after, before: the points after and before the motion, (m, 3).
+        rotation: of the motion, (m, 3, 3).
+        net: its displacement, (m,).
+    """
+    e1, e2 = axis_basis(line.direction)
+    if sliding:
+        return net[:, None, None] * np.stack([e1, e2], axis=1)
+    out = np.empty((len(net), 3, 4))
+    # A tilt towards e1 is a turn about e2, one towards e2 a turn about -e1.
+    for column, turn in enumerate((e2, -e1)):
+        matrix = skew(turn).T
+        out[:, :, column] = (after - line.point_m) @ matrix - (
+            rotation @ ((before - line.point_m) @ matrix)[:, :, None]
+        )[:, :, 0]
+    for column, shift in ((2, e1), (3, e2)):
+        out[:, :, column] = shift - rotation @ shift
+    return out
 
 
 def _moved_axis(line: Line, step: Array) -> Line:
@@ -221,23 +245,6 @@ def _by_net(line: Line, sliding: bool, after: Array, frame: Array) -> Array:
         return frame @ line.direction
     arm = (after - line.point_m) @ skew(line.direction).T
     return (frame @ arm[:, :, None])[:, :, 0]
-
-
-def _by_axis(line: Line, sliding: bool, after: Array, before: Array, rotation: Array, net: Array) -> Array:
-    """Derivatives by tilts and shifts of an axis in the frame before it, (m, 3, 4); sliding: (m, 3, 2)."""
-    e1, e2 = axis_basis(line.direction)
-    if sliding:
-        return net[:, None, None] * np.stack([e1, e2], axis=1)
-    out = np.empty((len(net), 3, 4))
-    # A tilt towards e1 is a turn about e2, one towards e2 a turn about -e1.
-    for column, turn in enumerate((e2, -e1)):
-        matrix = skew(turn).T
-        out[:, :, column] = (after - line.point_m) @ matrix - (
-            rotation @ ((before - line.point_m) @ matrix)[:, :, None]
-        )[:, :, 0]
-    for column, shift in ((2, e1), (3, e2)):
-        out[:, :, column] = shift - rotation @ shift
-    return out
 
 
 def _add_functions(

@@ -15,13 +15,14 @@ from core.errors import NotConverged
 from core.estimate import ArmEstimate
 from core.findings import Finding, findings
 from core.geometry import Array, invert
-from core.joint_by_joint import SweepMotion, joint_by_joint
+from core.joint_by_joint import joint_by_joint
 from core.measurements import Campaign
 from core.phi_convention import Convention, convention_for
 from core.phi_model import PhiModel, frames, from_axes
 from core.refinement import Refinement, refine
 from core.robot import Robot
 from core.sweep_fits import SweepFits, fit_sweeps
+from core.walk_from_base import SweepMotion
 
 
 @dataclass(frozen=True)

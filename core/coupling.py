@@ -1,41 +1,108 @@
 """Passive motion of the next joint: what the motor of joint i does to joint i+1 (section 3, equations 14 and 15)."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from core.arm import slide, turn
+from core.arm_jacobian import by_axis
 from core.axes.result import AxisFit
-from core.displacement import displacements
+from core.displacement import Displacements, displacements
 from core.function_fit import FunctionFit, SweepCurve, choose_function, fit_function
-from core.geometry import Array, Line
+from core.geometry import Array, Line, cross, rotation_about
 from core.motion_forms import coupling_form
 from core.robot import Coupling
 
 FAMILIES = ("proportional", "gear", "arctangent")
 
 
-def carried_back(points_m: Array, axis: Line, displacement: Array, sliding: bool) -> Array:
-    """Points (k, 3) as they would be if joint i had not moved: equation 14, one displacement a point (k,)."""
-    return slide(axis, -displacement, points_m) if sliding else turn(axis, -displacement, points_m)
+@dataclass(frozen=True)
+class CarriedPoints:
+    """Points on link i+1 as they would be if joint i had not moved (equation 14), and what that rests on."""
+
+    point_m: Array
+    """(k, 3)."""
+    stop: np.ndarray
+    target: np.ndarray
+    active: Array
+    """Active displacement of joint i from zero at each stop, (stops,)."""
+    active_std: Array
+    """(stops,)."""
+    active_by_axis: Array
+    """Change of it by tilts and shifts of axis i, (stops, e)."""
+    point_by_active: Array
+    """Change of the carried points by the displacement that was taken off them, (k, 3)."""
+    point_by_axis: Array
+    """Change of the carried points by tilts and shifts of axis i, (k, 3, e)."""
+    axis_covariance: Array
+    """Of tilts and shifts of axis i, (e, e)."""
 
 
-def passive_curve(
-    next_axis: AxisFit, points_m: Array, stop: np.ndarray, target: np.ndarray, active: Array, gain: float, std: Array
-) -> SweepCurve:
-    """Passive displacement of joint i+1 against the active one of joint i.
+def carry_back(
+    points_m: Array,
+    stop: np.ndarray,
+    target: np.ndarray,
+    axis: AxisFit,
+    net: Array,
+    moved: Displacements,
+    active: Array,
+) -> CarriedPoints:
+    """Undo the motion of joint i on points of link i+1.
 
     Args:
-        next_axis: the axis of joint i+1 when joint i stands at zero, with these points as ``used``.
-        points_m: points on link i+1 (or beyond it, held), already carried back by the motion of joint i, (k, 3).
+        points_m: points with the joints below i already undone, (k, 3).
         stop, target: of each point, (k,).
-        active: active displacement of joint i from zero at each stop, (stops,).
-        gain: nominal gain, which guides the unwrapping.
-        std: standard deviation of the active displacements, (stops,).
+        axis: the axis of joint i at zero.
+        net: net displacement of joint i at each stop, (stops,).
+        moved: displacements of joint i as observed in this sweep.
+        active: its active displacement from zero, (stops,).
     """
-    seen = np.unique(stop)
-    local = np.searchsorted(seen, stop)
-    found = displacements(next_axis, points_m, stop=local, target=target, commanded=gain * active[seen])
-    noise = np.sqrt(found.std**2 + (gain * std[seen]) ** 2)
-    return SweepCurve(active[seen], found.value, noise, -found.axis_effect, next_axis.covariance)
+    line, back = axis.line, -net[stop]
+    points = slide(line, back, points_m) if axis.sliding else turn(line, back, points_m)
+    rotations = rotation_about(line.direction, np.zeros(len(back)) if axis.sliding else back)
+    away = (
+        np.broadcast_to(line.direction, points.shape) if axis.sliding else cross(line.direction, points - line.point_m)
+    )
+    return CarriedPoints(
+        points,
+        stop,
+        target,
+        active,
+        np.full(len(active), float(np.nanmean(moved.std))),
+        moved.axis_effect,
+        -away,
+        by_axis(line, axis.sliding, points, points_m, rotations, back),
+        axis.covariance,
+    )
+
+
+def passive_curve(next_axis: AxisFit, points: CarriedPoints, gain: float) -> SweepCurve:
+    """Passive displacement of joint i+1 against the active one of joint i, with all that makes it uncertain.
+
+    Args:
+        next_axis: the axis of joint i+1 when joint i stands at zero.
+        points: on link i+1 or beyond it, carried back.
+        gain: nominal gain, which guides the unwrapping.
+    """
+    seen, local = np.unique(points.stop, return_inverse=True)
+    whole = replace(next_axis, used=np.ones(len(local), dtype=bool))
+    active = points.active[seen]
+    found = displacements(whole, points.point_m, stop=local, target=points.target, commanded=gain * active)
+    by_point, weight = _angle_by_point(next_axis, points.point_m)
+    total = np.bincount(local, weight)
+    by_active = np.bincount(local, weight * np.einsum("ki,ki->k", by_point, points.point_by_active)) / total
+    columns = np.einsum("ki,kie->ke", by_point, points.point_by_axis) * weight[:, None]
+    by_axis_below = np.stack([np.bincount(local, column) for column in columns.T], axis=1) / total[:, None]
+    # An error of the active displacement moves the point both ways: up the curve and along it.
+    slope = by_active - gain
+    effect = np.hstack([found.axis_effect, by_axis_below + slope[:, None] * points.active_by_axis[seen]])
+    sizes = len(next_axis.covariance), len(points.axis_covariance)
+    covariance = np.zeros((sum(sizes), sum(sizes)))
+    covariance[: sizes[0], : sizes[0]], covariance[sizes[0] :, sizes[0] :] = (
+        next_axis.covariance,
+        points.axis_covariance,
+    )
+    return SweepCurve(active, found.value, np.hypot(found.std, slope * points.active_std[seen]), effect, covariance)
 
 
 def fit_coupling(coupling: Coupling, curves: tuple[SweepCurve, ...]) -> FunctionFit:
@@ -52,3 +119,13 @@ def fit_coupling(coupling: Coupling, curves: tuple[SweepCurve, ...]) -> Function
         return fit_function(form, curves, level=True, nominal_slope=coupling.gain)
     forms = tuple((coupling_form(name, coupling.gain), 1.0) for name in FAMILIES)
     return choose_function(forms, curves, level=True, nominal_slope=coupling.gain)
+
+
+def _angle_by_point(axis: AxisFit, points_m: Array) -> tuple[Array, Array]:
+    """Gradient of the displacement about (along) an axis by the point, (k, 3), and the point's weight, (k,)."""
+    line: Line = axis.line
+    if axis.sliding:
+        return np.broadcast_to(line.direction, points_m.shape), np.ones(len(points_m))
+    along = cross(line.direction, points_m - line.point_m)
+    square = np.einsum("ki,ki->k", along, along)
+    return along / square[:, None], square

@@ -105,14 +105,16 @@ def _angle_finding(names: str, frame: int, deviation: tuple[float, float], paral
     if parallel:
         text = f"{names} are {_plain(abs(size), std, 'rad')} out of parallel"
     else:
-        text = f"{names} enclose an angle {_plain(abs(size), std, 'rad')} {'larger' if size > 0 else 'smaller'} than designed"
+        sense = "larger" if size > 0 else "smaller"
+        text = f"{names} enclose an angle {_plain(abs(size), std, 'rad')} {sense} than designed"
     return Finding(text, "angle_rad", size, std, frame=frame)
 
 
 def _distance_finding(names: str, frame: int, deviation: tuple[float, float], parallel: bool) -> Finding:
     size, std = deviation
     verb = "are" if parallel else "pass each other"
-    text = f"{names} {verb} {_plain(abs(size), std, 'm')} {'further apart' if size > 0 else 'closer together'} than designed"
+    sense = "further apart" if size > 0 else "closer together"
+    text = f"{names} {verb} {_plain(abs(size), std, 'm')} {sense} than designed"
     return Finding(text, "distance_m", size, std, frame=frame)
 
 
@@ -169,7 +171,8 @@ def _of_drives(robot: Robot, estimate: ArmEstimate) -> list[Finding]:
             found.append(_zero_finding(robot, joint, estimate, suffix))
         if fit.form.name == "ratio":
             error, std = 1.0 / fit.coefficients[0] - 1.0, float(fit.std[0]) / fit.coefficients[0] ** 2
-            text = f"joint {joint} moves {abs(error):.2%} +- {std:.2%} {'further' if error > 0 else 'less far'} than commanded"
+            sense = "further" if error > 0 else "less far"
+            text = f"joint {joint} moves {abs(error):.2%} +- {std:.2%} {sense} than commanded"
             found.append(Finding(text, "ratio", error, std, joint=joint))
         elif len(fit.coefficients) >= 2:
             found.append(_periodic_finding(joint, MotionFunction(fit.form, fit.coefficients), fit.covariance))

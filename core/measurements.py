@@ -143,8 +143,9 @@ class Campaign:
             if not 0 <= target.link <= n:
                 raise CampaignError(f"target {target.name!r} rides on link {target.link}, expected 0..{n}")
         if self.measurements.commanded.shape != (self.measurements.count, n):
+            commands = self.measurements.commanded.shape[1]
             raise CampaignError(
-                f"{self.robot.name} has {n} joints, but the measurements have {self.measurements.commanded.shape[1]} commands a row"
+                f"{self.robot.name} has {n} joints, but the measurements have {commands} commands a row"
             )
         if self.home is not None and np.shape(self.home) != (n,):
             raise CampaignError(f"the home pose needs {n} values, one a joint, got {np.size(self.home)}")

@@ -11,8 +11,8 @@ import numpy as np
 from core.arm_jacobian import ArmState, Observations, Prediction, active_displacements
 from core.function_fit import FunctionFit, SweepCurve
 from core.geometry import Array
-from core.joint_by_joint import SweepMotion
 from core.motion_forms import MotionFunction
+from core.walk_from_base import SweepMotion
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,10 @@ import numpy as np
 
 from core.arm import Arm, carry
 from core.arm_jacobian import ArmState, net_displacements, predict
+from core.drives import drive_functions, offset_std
 from core.estimate import ArmEstimate
 from core.function_fit import FunctionFit
 from core.geometry import Array, cross
-from core.joint_by_joint import SweepMotion, drive_functions, offset_std
 from core.measurements import Campaign
 from core.motion_forms import MotionFunction
 from core.noise import Noise
@@ -34,6 +34,7 @@ from core.phi_uncertainty import geometry_from_axes
 from core.refined_curves import Seen, refined_motions, with_curves
 from core.refinement_problem import RefinementProblem, Solved
 from core.sweep_fits import SweepFits
+from core.walk_from_base import SweepMotion
 
 MOST_ROUNDS = 12
 """Rounds of fitting, estimating the noise and leaving out what stands out."""
