@@ -347,6 +347,11 @@ def sweep_rows(calibration: Calibration) -> Iterator[tuple[SweepFit, slice]]:
         at += count
 
 
+def _clean(value: float) -> float:
+    """Zero instead of what rounding leaves of it: a millionth of a nanometre or of a degree means nothing."""
+    return 0.0 if abs(value) < 1e-9 else float(value)
+
+
 def _columns(names: str) -> list[str]:
     return names.split()
 
@@ -413,13 +418,13 @@ def _parameter_rows(calibration: Calibration) -> Iterator[dict[str, object]]:
             "phi_deg": np.rad2deg(nominal.phi_rad[i]),
             "parameter": PARAMETERS[k].split("_")[0],
             "unit": unit,
-            "nominal": design * scale,
-            "actual": actual * scale,
-            "difference": (actual - design) * scale,
+            "nominal": _clean(design * scale),
+            "actual": _clean(actual * scale),
+            "difference": _clean((actual - design) * scale),
             "std": std * scale,
             "significance": abs(actual - design) / std if free and std > 0 else np.nan,
             "significant": bool(free and abs(actual - design) > 2 * std),
             "fixed": not free,
-            "joint_by_joint": start.model.parameters[i, k] * scale if start is not None else np.nan,
+            "joint_by_joint": _clean(start.model.parameters[i, k] * scale) if start is not None else np.nan,
             "joint_by_joint_std": start.std[i, k] * scale if start is not None else np.nan,
         }

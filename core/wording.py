@@ -3,6 +3,7 @@
 import numpy as np
 
 from core.calibration import Calibration
+from core.findings import Finding
 from core.measurements import Campaign
 from core.noise import Noise, is_stated
 
@@ -52,9 +53,9 @@ def typeset(text: str) -> str:
 
 
 def is_simulated(campaign: Campaign) -> bool:
-    """Whether the campaign itself says that no real robot was measured."""
-    words = [campaign.title, *campaign.notes.values(), *campaign.instrument.description.values()]
-    return any("simulat" in str(word).lower() for word in words)
+    """Whether the campaign itself says that no real robot was measured: in its title, source or instrument."""
+    words = [campaign.title, campaign.notes.get("source", ""), *campaign.instrument.description.values()]
+    return any("simulated" in (text := str(word).lower()) and "not simulated" not in text for word in words)
 
 
 def stated_noise_m(calibration: Calibration) -> float | None:
@@ -69,3 +70,92 @@ def joint_list(joints: tuple[int, ...]) -> str:
     if len(names) == 1:
         return f"joint {names[0]}"
     return f"joints {', '.join(names[:-1])} and {names[-1]}"
+
+
+def summary(calibration: Calibration) -> tuple[str, ...]:
+    """What was found, in three to six sentences, the significant first."""
+    sentences = (
+        _compared(calibration),
+        _strongest(calibration),
+        _zeros(calibration),
+        _noise(calibration),
+        _points(calibration),
+        _missing(calibration),
+    )
+    return tuple(typeset(s) for s in sentences if s)
+
+
+def duration(seconds: float) -> str:
+    """A span of time: 45 s, 12 min, 1 h 50 min."""
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def _judged(calibration: Calibration) -> list[Finding]:
+    """Findings with an uncertainty of their own: readings at the arm's marks are what they are."""
+    return [f for f in calibration.findings if f.std > 0]
+
+
+def _compared(calibration: Calibration) -> str:
+    judged = _judged(calibration)
+    if not judged:
+        return "Nothing could be compared with the design."
+    count = sum(f.significant for f in judged)
+    beyond = "by more than two standard uncertainties"
+    if count == 0:
+        return f"None of the {len(judged)} quantities that were compared differs from the design {beyond}."
+    verb = "differs" if count == 1 else "differ"
+    return f"{count} of the {len(judged)} quantities that were compared {verb} from the design {beyond}."
+
+
+def _strongest(calibration: Calibration) -> str:
+    """The most certain deviations: two between axes, which depend on no choice of frames, and one of a drive."""
+    clear = [f for f in _judged(calibration) if f.significant]
+    between = [f for f in clear if f.parameter in ("distance_m", "angle_rad")][:2]
+    drives = [f for f in clear if f.joint is not None][:1]
+    texts = [f.text for f in between + drives] or [f.text for f in clear[:2]]
+    return f"Most certain: {'; '.join(texts)}." if texts else ""
+
+
+def _zeros(calibration: Calibration) -> str:
+    readings = [f for f in calibration.findings if f.parameter.startswith("zero") and f.deviation != 0]
+    if not readings:
+        return ""
+    worst = max(readings, key=lambda f: (f.parameter == "zero_rad", abs(f.deviation)))
+    if len(readings) == 1:
+        return f"{worst.text[0].upper()}{worst.text[1:]}."
+    unit, scale = parameter_unit(worst.parameter)
+    size = fixed(abs(worst.deviation) * scale, 3)
+    return f"At the arm's marks {len(readings)} joints do not read zero; joint {worst.joint} is {size} {unit} off."
+
+
+def _noise(calibration: Calibration) -> str:
+    found, stated = calibration.estimate.noise_m * 1e3, stated_noise_m(calibration)
+    text = f"One coordinate of a point scatters by {found:.2g} mm (standard deviation)"
+    if stated is None:
+        return f"{text}, estimated from the points; the campaign states none."
+    ratio, stated = found / (stated * 1e3), stated * 1e3
+    if ratio > 1.1:
+        return f"{text}, {ratio:.2g} times the {stated:.2g} mm that were stated for the instrument."
+    if ratio < 0.9:
+        return f"{text}, less than the {stated:.2g} mm that were stated for the instrument."
+    return f"{text}, as stated for the instrument ({stated:.2g} mm)."
+
+
+def _points(calibration: Calibration) -> str:
+    used = calibration.refinement.residuals.used
+    left = int((~used).sum())
+    points = f"{used.sum()} points of {len(calibration.found.fits)} sweeps were used"
+    if left == 0:
+        return f"{points}; none was rejected."
+    return f"{points}; {left} {'was' if left == 1 else 'were'} rejected."
+
+
+def _missing(calibration: Calibration) -> str:
+    absent = tuple(sorted({*calibration.not_swept, *calibration.not_moved}))
+    if not absent:
+        return ""
+    text = f"The data say nothing of {joint_list(absent)}"
+    return f"{text}, so the geometry of the whole arm cannot be given." if calibration.nominal is None else f"{text}."

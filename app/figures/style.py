@@ -1,0 +1,113 @@
+"""The common look of all figures: sizes, colours, fonts, thinning, and what plotly's tool bar may show.
+
+Colours are those of Okabe and Ito (2008, "Color Universal Design"): told apart by colour-blind eyes and, with the
+markers that always go with them, in grey print.
+"""
+
+from html import escape
+
+import numpy as np
+import plotly.graph_objects as go
+
+from core.geometry import Array
+
+WIDTH_PX = 340
+"""Of one small figure; two stand side by side on A4 paper."""
+WIDE_PX = 690
+"""Of a figure over the whole width of the paper."""
+MOST_POINTS = 2000
+"""Of one trace; beyond that markers cover each other and the page gets slow."""
+
+BLACK, BLUE, VERMILLION, GREEN = "#1b1f24", "#0072B2", "#D55E00", "#009E73"
+ORANGE, SKY, PURPLE, GREY = "#E69F00", "#56B4E9", "#CC79A7", "#6b7280"
+SERIES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "pentagon", "hexagon")
+BAND = "rgba(86, 180, 233, 0.24)"
+NOISE_BAND = "rgba(107, 114, 128, 0.16)"
+FONT = "system-ui, 'Segoe UI', 'Helvetica Neue', 'Liberation Sans', Arial, sans-serif"
+
+CONFIG = {
+    "displaylogo": False,
+    "showEditInChartStudio": False,
+    "showSendToCloud": False,
+    "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
+    "toImageButtonOptions": {"format": "svg"},
+}
+"""For ``Plotly.newPlot``."""
+
+
+def plain(text: str) -> str:
+    """Text from a file, to be shown as it is: plotly reads a little HTML in its labels."""
+    return escape(text, quote=False)
+
+
+def styled(figure: go.Figure, title: str, height_px: int, width_px: int = WIDTH_PX) -> go.Figure:
+    """Give a figure the common look; ``title`` must be free of markup that is not meant."""
+    figure.update_layout(
+        title={
+            "text": f"<b>{title}</b>",
+            "x": 0.0,
+            "xref": "container",
+            "xanchor": "left",
+            "y": 1.0,
+            "yref": "container",
+        },
+        title_font_size=13,
+        title_yanchor="top",
+        title_pad={"t": 7, "l": 4},
+        width=width_px,
+        height=height_px,
+        margin={"l": 58, "r": 10, "t": 34, "b": 64},
+        font={"family": FONT, "size": 11, "color": BLACK},
+        paper_bgcolor="white",
+        plot_bgcolor="white",
+        legend={"orientation": "h", "x": 0, "xanchor": "left", "y": 0, "yref": "container", "yanchor": "bottom"},
+        legend_font_size=10.5,
+        hoverlabel={"font_size": 11},
+        template="none",
+    )
+    axes = {"linecolor": "#9aa1ab", "showline": True, "gridcolor": "#e4e7eb", "ticks": "outside", "ticklen": 4}
+    axes |= {"tickcolor": "#9aa1ab", "title_font_size": 11, "tickfont_size": 10.5, "mirror": True, "automargin": False}
+    figure.update_xaxes(**axes, zeroline=False)
+    figure.update_yaxes(**axes, zeroline=True, zerolinecolor="#9aa1ab", zerolinewidth=1)
+    return figure
+
+
+def thinned(count: int, keep: Array | None = None, most: int = MOST_POINTS) -> np.ndarray:
+    """Which of many points are drawn: evenly spread ones, and those with the largest ``keep``; sorted indices.
+
+    Args:
+        count: how many there are.
+        keep: size of each, (count,); the largest twentieth of what is drawn is never left out.
+        most: how many may be drawn.
+    """
+    if count <= most:
+        return np.arange(count)
+    special = 0 if keep is None else most // 20
+    chosen = np.linspace(0, count - 1, most - special).round().astype(int)
+    if keep is not None:
+        chosen = np.concatenate([chosen, np.argsort(-np.abs(keep))[:special]])
+    return np.unique(chosen)
+
+
+def symmetric_range(*values: Array, share: float = 1.12) -> list[float]:
+    """A range about zero that holds all finite values."""
+    sizes = [float(np.max(np.abs(v[np.isfinite(v)]), initial=0.0)) for v in map(np.atleast_1d, values)]
+    top = max([*sizes, 1e-9]) * share
+    return [-top, top]
+
+
+def band(x: Array, low: Array, high: Array, name: str, colour: str = BAND, show: bool = True) -> go.Scatter:
+    """A filled band between two curves over ascending x."""
+    return go.Scatter(
+        x=np.concatenate([x, x[::-1]]),
+        y=np.concatenate([high, low[::-1]]),
+        fill="toself",
+        fillcolor=colour,
+        line={"width": 0},
+        mode="lines",
+        name=name,
+        legendgroup=name,
+        showlegend=show,
+        hoverinfo="skip",
+    )
