@@ -14,6 +14,7 @@ from core.json_values import Json, degrees, json_text, mm, named, number, number
 from core.motion_json import coupling_records, transmission_records
 from core.sweep_fits import SweepFit
 from core.version import VERSION
+from core.wording import joint_list, parameter_unit
 
 CALIBRATION_FORMAT = "trueaxis-calibration/1"
 FRAME_KEYS = ("a_mm", "b_mm", "alpha_deg", "theta_deg")
@@ -173,16 +174,15 @@ def _frame_values(row: Array) -> Json:
 
 
 def _finding_record(finding: Finding) -> Json:
-    quantity, _, unit_si = finding.parameter.rpartition("_")
-    unit, scale = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}.get(unit_si, ("1", 1.0))
+    unit, scale = parameter_unit(finding.parameter)
     where = {"frame": finding.frame, "joint": finding.joint}
     return {
         "text": finding.text,
         **{key: value for key, value in where.items() if value is not None},
-        "parameter": finding.parameter if unit == "1" else f"{quantity}_{unit}",
+        "parameter": f"{finding.parameter.rpartition('_')[0]}_{unit}" if unit else finding.parameter,
         "deviation": number(finding.deviation * scale),
         "std": number(finding.std * scale),
-        "unit": unit,
+        "unit": unit or "1",
         "significant": finding.significant,
     }
 
@@ -226,13 +226,11 @@ def _rejection_records(calibration: Calibration) -> list[Json]:
 def _notes(calibration: Calibration) -> list[str]:
     """What these data cannot say, in sentences."""
     notes = []
-    unknown = sorted({*calibration.not_swept, *calibration.not_moved})
+    unknown = tuple(sorted({*calibration.not_swept, *calibration.not_moved}))
     if unknown:
-        joints = ", ".join(map(str, unknown))
-        many = len(unknown) > 1
+        verb = "were" if len(unknown) > 1 else "was"
         notes.append(
-            f"joint{'s' if many else ''} {joints} {'were' if many else 'was'} not swept, "
-            "so no frames are given: the geometry needs the axis of every joint"
+            f"{joint_list(unknown)} {verb} not swept, so no frames are given: geometry needs the axis of every joint"
         )
     elif calibration.estimate.geometry is None:
         notes.append("an arm of one joint has no frames")
