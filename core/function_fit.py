@@ -133,7 +133,7 @@ def fit_function(
         for k, errors in enumerate(axis):
             axis[k] = errors + step[at : at + len(errors)]
             at += len(errors)
-        if gradient @ step < 1e-10 * (1.0 + chi_square):
+        if gradient @ step < 1e-6 * (1.0 + chi_square):
             covariance = np.linalg.pinv(normal * scale[:, None] * scale, rcond=1e-14, hermitian=True)
             covariance = covariance * scale[:, None] * scale
             return _function_fit(
