@@ -6,7 +6,7 @@ import numpy as np
 
 from core.arm import slide, turn
 from core.arm_jacobian import by_axis
-from core.axes.result import AxisFit
+from core.axes.result import AxisFit, outlier_probabilities
 from core.displacement import Displacements, displacements
 from core.function_fit import FunctionFit, SweepCurve, choose_function, fit_function
 from core.geometry import Array, Line, cross, rotation_about
@@ -14,6 +14,8 @@ from core.motion_forms import coupling_form
 from core.robot import Coupling
 
 FAMILIES = ("proportional", "gear", "arctangent")
+LEAST_KEPT = 0.8
+"""At least this share of the stops of a curve is kept, however they lie."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,36 @@ def passive_curve(next_axis: AxisFit, points: CarriedPoints, gain: float) -> Swe
         points.axis_covariance,
     )
     return SweepCurve(active, found.value, np.hypot(found.std, slope * points.active_std[seen]), effect, covariance)
+
+
+def stops_that_stand_out(curve: SweepCurve) -> np.ndarray:
+    """Stops of a passive curve that lie off a smooth one, boolean, (stops,).
+
+    The curve is smooth whatever its family, so a parabola through all but the worst stops tells which stand out.
+    """
+    design = np.stack([np.ones_like(curve.displacement), curve.displacement, curve.displacement**2], axis=1)
+    keep = np.ones(len(curve.y), dtype=bool)
+    while keep.sum() > max(6, LEAST_KEPT * len(keep)):
+        rows, weight = design[keep], 1.0 / curve.std[keep]
+        q, _ = np.linalg.qr(rows * weight[:, None])
+        residual = curve.y[keep] * weight
+        residual = residual - q @ (q.T @ residual)
+        free = np.maximum(1.0 - np.sum(q**2, axis=1), 1e-6)
+        total, freedom = float(residual @ residual), int(keep.sum()) - 3
+        chance = outlier_probabilities(residual**2 / free, np.ones(len(residual)), total, freedom)
+        worst = int(np.argmin(chance))
+        if chance[worst] * len(chance) >= 1e-3:
+            break
+        keep[np.flatnonzero(keep)[worst]] = False
+    return ~keep
+
+
+def without_stops(curve: SweepCurve, out: np.ndarray) -> SweepCurve:
+    """The curve without some of its stops."""
+    keep = ~out
+    return SweepCurve(
+        curve.displacement[keep], curve.y[keep], curve.std[keep], curve.axis_effect[keep], curve.axis_covariance
+    )
 
 
 def fit_coupling(coupling: Coupling, curves: tuple[SweepCurve, ...]) -> FunctionFit:

@@ -50,6 +50,8 @@ class Finding:
 def findings(robot: Robot, nominal: PhiModel | None, estimate: ArmEstimate) -> tuple[Finding, ...]:
     """All findings, the significant ones first, each group by how many uncertainties it deviates.
 
+    Readings at the arm's marks are stated, not estimated, and have no uncertainty: they close the significant ones.
+
     Args:
         robot: the nominal robot.
         nominal: its phi-model; None: not every joint was swept, so that only the drives are judged.
@@ -59,7 +61,7 @@ def findings(robot: Robot, nominal: PhiModel | None, estimate: ArmEstimate) -> t
     if nominal is not None and estimate.geometry is not None:
         found += _of_axis_pairs(robot, estimate)
         found += _of_parameters(nominal, estimate)
-    return tuple(sorted(found, key=lambda f: (not f.significant, -abs(f.deviation) / max(f.std, 1e-15))))
+    return tuple(sorted(found, key=lambda f: (not f.significant, f.std == 0, -abs(f.deviation) / max(f.std, 1e-15))))
 
 
 def _of_parameters(nominal: PhiModel, estimate: ArmEstimate) -> list[Finding]:

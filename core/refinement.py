@@ -101,7 +101,7 @@ def refine(
         NotConverged: Gauss-Newton did not settle; the joint-by-joint estimate stands.
     """
     problem = RefinementProblem.of(campaign, found, start)
-    used = np.concatenate([f.used for f in found.fits]) & problem.knowable
+    used = np.concatenate([_used(m) for m in motions]) & problem.knowable
     state, noise, excess = problem.start_state(start), found.noise, np.zeros(campaign.robot.joint_count)
     prediction = predict(state, problem.seen, problem.layout)
     for _ in range(MOST_ROUNDS):
@@ -258,6 +258,13 @@ def _axes_in_place(problem: RefinementProblem, state: ArmState) -> Array:
     directions = np.stack([line.direction for line in state.axes])[problem.joint - 1]
     near = carry(state.axes, problem.seen.sliding, net, problem.joint - 1, ends)
     return carry(state.axes, problem.seen.sliding, net, problem.joint - 1, ends + directions) - near
+
+
+def _used(motion: SweepMotion) -> np.ndarray:
+    """Rows of a sweep that did not stand out in the joint-by-joint fits, boolean, (k,)."""
+    used = motion.found.used.copy()
+    used[list(motion.passive_outliers)] = False
+    return used
 
 
 def _worst_outlier(solved: Solved, used: np.ndarray) -> int | None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from core.arm import Arm
 from core.axes import AxisFit
-from core.coupling import carry_back, fit_coupling, passive_curve
+from core.coupling import carry_back, fit_coupling, passive_curve, stops_that_stand_out, without_stops
 from core.displacement import Displacements
 from core.drives import coupling_functions, drive_functions
 from core.errors import TrueaxisError
@@ -27,6 +27,8 @@ class SweepMotion:
     """Commanded against actual displacement."""
     passive: SweepCurve | None = None
     """Passive displacement of the next joint against the active one of this, if a second target was watched."""
+    passive_outliers: tuple[int, ...] = ()
+    """Rows of the sweep that stand out of the passive curve."""
 
 
 class WalkFromBase:
@@ -148,17 +150,20 @@ class WalkFromBase:
         curves = []
         for index, motion in enumerate(self.motions):
             if motion.found.sweep.joint == joint - 1 and axis is not None:
-                curve = self._passive(motion, joint, axis, coupling.gain)
-                if curve is not None:
-                    self.motions[index] = replace(motion, passive=curve)
-                    curves.append(curve)
+                seen = self._passive(motion, joint, axis, coupling.gain)
+                if seen is not None:
+                    self.motions[index] = replace(motion, passive=seen[0], passive_outliers=seen[1])
+                    curves.append(seen[0])
         if curves:
             try:
                 self.couplings[joint - 1] = fit_coupling(coupling, tuple(curves))
             except TrueaxisError as error:
                 raise type(error)(f"coupling {joint - 1} -> {joint}: {error}") from None
 
-    def _passive(self, motion: SweepMotion, joint: int, axis: AxisFit, gain: float) -> SweepCurve | None:
+    def _passive(
+        self, motion: SweepMotion, joint: int, axis: AxisFit, gain: float
+    ) -> tuple[SweepCurve, tuple[int, ...]] | None:
+        """The passive curve of a sweep without stops that stand out, and the rows of these; None: nothing to see."""
         sweep = motion.found.sweep
         asked = active_from_zero(self.campaign, sweep.commanded)
         if np.ptp(asked[:, joint - 1]) > SAME_COMMAND:
@@ -180,7 +185,10 @@ class WalkFromBase:
             _in_basis_of(self.axes[joint - 2], motion, below),
             active[:, joint - 2],
         )
-        return passive_curve(axis, carried, gain)
+        curve = passive_curve(axis, carried, gain)
+        out = stops_that_stand_out(curve)
+        outlying = rows[np.isin(sweep.stop[rows], np.unique(sweep.stop[rows])[out])]
+        return without_stops(curve, out), tuple(int(row) for row in outlying)
 
     def _observed(self, motion: SweepMotion, active: Array) -> Array:
         """Active displacements with those of the swept joint as they were seen, not as the function has them."""

@@ -1,6 +1,7 @@
 """Joint axes from measured points: one call for every kind of joint and both estimators."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,6 +9,7 @@ from numpy.typing import ArrayLike
 from core.axes.likelihood import fit_rotary_axis
 from core.axes.paper import fit_paper_axis
 from core.axes.points import SweepPoints, sweep_points
+from core.axes.rejection import fit_rejecting, spread
 from core.axes.result import AxisFit
 from core.axes.sliding import fit_sliding_axis
 from core.errors import InputError
@@ -16,7 +18,6 @@ from core.geometry import Array, Line
 __all__ = ["AxisFit", "fit_axis"]
 
 ESTIMATORS = ("likelihood", "paper")
-LARGEST_REJECTED_SHARE = 0.2
 
 
 def fit_axis(
@@ -58,56 +59,12 @@ def fit_axis(
     if estimator not in ESTIMATORS:
         raise InputError(f"there is no axis estimator {estimator!r}; expected one of {', '.join(ESTIMATORS)}")
     points = sweep_points(points_m, target, stop, sigma_m, covariance_m2)
-    fit = _fit(points, sliding, robust)
-    if reject:
-        fit = _without_outliers(points, fit, robust)
+    fit_points = partial(fit_sliding_axis if sliding else fit_rotary_axis, robust=robust)
+    fit = fit_rejecting(points, fit_points) if reject else fit_points(points)
     fit = _in_positive_sense(points, fit, commanded)
     if estimator == "paper":
         return _paper(points, fit)
     return fit
-
-
-def _fit(points: SweepPoints, sliding: bool, robust: bool) -> AxisFit:
-    return fit_sliding_axis(points, robust) if sliding else fit_rotary_axis(points, robust)
-
-
-def _without_outliers(points: SweepPoints, fit: AxisFit, robust: bool) -> AxisFit:
-    """Take out the point that stands out most, fit again, and so on while any does."""
-    used, found = np.ones(points.count, dtype=bool), fit
-    for _ in range(int(LARGEST_REJECTED_SHARE * points.count)):
-        if not found.outliers.any():
-            break
-        rows = np.flatnonzero(used)
-        used[rows[np.argmin(found.outlier_probability)]] = False
-        found = _fit(points.only(used), fit.sliding, robust)
-    return fit if used.all() else _spread(points, found, used, fit)
-
-
-def _spread(points: SweepPoints, found: AxisFit, used: np.ndarray, first: AxisFit) -> AxisFit:
-    """The fit of the used points with residuals of all of them."""
-    axial, radial, tangential, probability = (np.zeros(points.count) for _ in range(4))
-    probability[used] = found.outlier_probability
-    axial[used], radial[used], tangential[used] = found.axial_m, found.radial_m, found.tangential_m
-    left_out = np.flatnonzero(~used)
-    x, y, z = np.vstack([found.basis, found.line.direction]) @ (points.point_m[left_out] - found.line.point_m).T
-    target = points.target_index()
-    if found.sliding:
-        inside = points.only(used).point_m @ found.basis.T
-        for k in np.unique(target[left_out]):
-            rows = left_out[target[left_out] == k]
-            middle = inside[target[used] == k].mean(axis=0) if np.any(target[used] == k) else np.zeros(2)
-            radial[rows], tangential[rows] = (points.point_m[rows] @ found.basis.T - middle).T
-    else:
-        axial[left_out] = z - found.height_m[target[left_out]]
-        radial[left_out] = np.hypot(x, y) - found.radius_m[target[left_out]]
-    return replace(
-        found,
-        axial_m=axial,
-        radial_m=radial,
-        tangential_m=tangential,
-        used=used,
-        outlier_probability=np.where(used, probability, first.outlier_probability),
-    )
 
 
 def _in_positive_sense(points: SweepPoints, fit: AxisFit, commanded: ArrayLike | None) -> AxisFit:
@@ -169,4 +126,4 @@ def _paper(points: SweepPoints, fit: AxisFit) -> AxisFit:
         tangential_m=fit.tangential_m[used],
         outlier_probability=fit.outlier_probability[used],
     )
-    return _spread(points, fit_paper_axis(points.only(used), inside), used, fit)
+    return spread(points, fit_paper_axis(points.only(used), inside), used, fit.outlier_probability)

@@ -225,3 +225,12 @@ def test_the_same_campaign_gives_the_same_answer(noisy):
     one, other = calibrate(noisy), calibrate(noisy)
     np.testing.assert_array_equal(one.estimate.axis_covariance, other.estimate.axis_covariance)
     assert one.findings == other.findings
+
+
+@pytest.mark.parametrize("size_m", [0.005, 0.1, 1.0])
+@pytest.mark.parametrize("row", [3, 20, 60, 100, 128])
+def test_one_gross_error_anywhere_is_found_and_nothing_else(noisy, row, size_m):
+    points = noisy.measurements.point_m.copy()
+    points[row] += np.array([0.6, -0.6, 0.5]) * size_m
+    found = calibrate(with_points(noisy, points))
+    assert [r.record for r in found.rejected] == [int(noisy.measurements.record[row])]
