@@ -91,7 +91,7 @@ def calibrate(campaign: Campaign, estimator: str = "likelihood", reject: bool = 
     """
     found = fit_sweeps(campaign, estimator, reject)
     convention, nominal = nominal_frames(campaign.robot, found)
-    start, motions = joint_by_joint(campaign, found, convention, nominal)
+    start, motions = joint_by_joint(campaign, found, convention, nominal, reject)
     refinement = refine(campaign, found, motions, start, convention, nominal, reject)
     return Calibration(
         campaign=campaign,

@@ -25,7 +25,11 @@ from core.walk_from_base import SweepMotion, WalkFromBase
 
 
 def joint_by_joint(
-    campaign: Campaign, found: SweepFits, convention: Convention | None, nominal: PhiModel | None
+    campaign: Campaign,
+    found: SweepFits,
+    convention: Convention | None,
+    nominal: PhiModel | None,
+    reject: bool = True,
 ) -> tuple[ArmEstimate, tuple[SweepMotion, ...]]:
     """Estimate the arm one joint at a time from the axes of its sweeps.
 
@@ -33,6 +37,7 @@ def joint_by_joint(
         campaign: what was measured.
         found: the axes of all sweeps.
         convention, nominal: the frames of the phi-model; None: not every joint was swept.
+        reject: leave out stops that stand out of the curve of a passive motion.
 
     Raises:
         CampaignError: a joint without a sweep stands differently in two sweeps.
@@ -40,7 +45,7 @@ def joint_by_joint(
     _require_still(campaign, found)
     motions = [_motion(campaign, fit) for fit in found.fits]
     drives = _transmissions(campaign, motions)
-    walk = WalkFromBase(campaign, found, motions, drives)
+    walk = WalkFromBase(campaign, found, motions, drives, reject)
     walk.run()
     arm = walk.arm()
     covariance = walk.axis_covariance()

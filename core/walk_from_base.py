@@ -35,12 +35,18 @@ class WalkFromBase:
     """The walk from joint 1 up: axes at the zero pose, and couplings, each resting on what lies below it."""
 
     def __init__(
-        self, campaign: Campaign, found: SweepFits, motions: list[SweepMotion], drives: list[FunctionFit | None]
+        self,
+        campaign: Campaign,
+        found: SweepFits,
+        motions: list[SweepMotion],
+        drives: list[FunctionFit | None],
+        reject: bool,
     ) -> None:
         n = campaign.robot.joint_count
         self.campaign, self.found, self.motions = campaign, found, motions
         self.functions = drive_functions(campaign, drives)
         self.drives = drives
+        self.reject = reject
         self.axes: list[Line] = []
         self.couplings: list[FunctionFit | None] = [None] * n
         self.measured: list[tuple[AxisFit | None, Array]] = []
@@ -186,7 +192,7 @@ class WalkFromBase:
             active[:, joint - 2],
         )
         curve = passive_curve(axis, carried, gain)
-        out = stops_that_stand_out(curve)
+        out = stops_that_stand_out(curve) if self.reject else np.zeros(len(curve.y), dtype=bool)
         outlying = rows[np.isin(sweep.stop[rows], np.unique(sweep.stop[rows])[out])]
         return without_stops(curve, out), tuple(int(row) for row in outlying)
 
