@@ -13,6 +13,7 @@ theorem. Everything is exact and vectorised over points.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -49,6 +50,11 @@ class Observations:
     """Which joints slide, (n,)."""
     home: bool
     """Whether the arm's marks define zero."""
+
+    @cached_property
+    def levels(self) -> tuple[tuple[Array, np.ndarray], ...]:
+        """Of every joint, the distinct commands and which of them each point has: most joints stand still mostly."""
+        return tuple(np.unique(column, return_inverse=True) for column in self.asked.T)
 
 
 @dataclass(frozen=True)
@@ -190,12 +196,14 @@ def _active(state: ArmState, seen: Observations) -> tuple[Array, list[Array]]:
     """Active displacements (m, n), and their derivatives by the constants of their own function, (m, p_i) each."""
     active, gradients = np.empty_like(seen.asked), []
     for i, function in enumerate(state.transmissions):
+        commands, which = seen.levels[i]
         at_zero, _, gradient_at_zero = function.form.evaluate(np.zeros(1), function.coefficients)
-        active[:, i] = function.inverse(seen.asked[:, i] + (at_zero[0] if seen.home else 0.0))
-        _, slope, gradient = function.form.evaluate(active[:, i], function.coefficients)
+        displacement = function.inverse(commands + (at_zero[0] if seen.home else 0.0))
+        _, slope, gradient = function.form.evaluate(displacement, function.coefficients)
         if seen.home:
             gradient = gradient - gradient_at_zero
-        gradients.append(-gradient / slope[:, None])
+        active[:, i] = displacement[which]
+        gradients.append((-gradient / slope[:, None])[which])
     return active, gradients
 
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from core.arm_jacobian import ArmState, Layout, Observations, Prediction, moved, predict
+from core.arm import slide, turn
+from core.arm_jacobian import ArmState, Layout, Observations, Prediction, moved, net_displacements, predict
 from core.axes.result import outlier_probabilities
 from core.errors import NotConverged
 from core.estimate import ArmEstimate
@@ -83,18 +84,14 @@ class RefinementProblem:
         )
 
     def start_state(self, start: ArmEstimate) -> ArmState:
-        """Targets at rest by carrying every point back, and averaging."""
+        """Targets at rest: every point carried back to zero, and the median of each target."""
         state = state_of(start, np.zeros((len(self.targets), 3)))
-        # Two passes of one linear fit: predicted points are affine in the targets at rest.
-        prediction = predict(state, self.seen, self.layout)
-        rest = np.zeros((len(self.targets), 3))
-        turns = prediction.jacobian[:, :, self.layout.targets]
-        residual = self.seen.point_m - prediction.point_m
-        for k in range(len(self.targets)):
-            mine = self.seen.target == k
-            back = turns[mine][:, :, 3 * k : 3 * k + 3].swapaxes(1, 2) @ residual[mine][:, :, None]
-            rest[k] = np.median(back[:, :, 0], axis=0)
-        return state_of(start, rest)
+        points, net = self.seen.point_m, net_displacements(state, self.seen)
+        for i, axis in enumerate(state.axes):
+            undo = slide if self.seen.sliding[i] else turn
+            points = np.where((self.seen.link > i)[:, None], undo(axis, -net[:, i], points), points)
+        rest = [np.median(points[self.seen.target == k], axis=0) for k in range(len(self.targets))]
+        return state_of(start, np.array(rest))
 
     def covariance(self, noise: Noise, excess: Array, prediction: Prediction) -> Array:
         """Covariance of every point, the excess along the arcs included, (m, 3, 3)."""
@@ -144,8 +141,7 @@ class RefinementProblem:
         return residual, float(residual @ residual)
 
     def _probability(self, matrix: Array, inverse: Array, residual: Array, cost: float, used: np.ndarray) -> Array:
-        rows = matrix.reshape(-1, 3, self.layout.size)
-        pull = np.einsum("mij,jk,mik->m", rows, inverse, rows, optimize=True)
+        pull = np.einsum("ij,ij->i", matrix @ inverse, matrix).reshape(-1, 3).sum(axis=1)
         square = np.einsum("mi,mi->m", residual.reshape(-1, 3), residual.reshape(-1, 3))
         freedom = np.maximum(3.0 - pull, 0.3)
         count = max(3 * int(used.sum()) - self.layout.size, 1)
