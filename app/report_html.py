@@ -10,6 +10,7 @@ from app.report_page import Item, Page, Plot, Section, page_html
 from app.report_tables import (
     family_words,
     is_empty,
+    reason_words,
     shown_axes,
     shown_candidates,
     shown_constants,
@@ -24,7 +25,7 @@ from app.report_tables import (
 from app.report_words import CONVENTIONS, TERMS, facts, key_numbers
 from core.calibration import Calibration
 from core.function_fit import FunctionFit
-from core.wording import decimals_for, display_unit, fixed, is_simulated, joint_list, summary, typeset
+from core.wording import as_sentence, decimals_for, display_unit, fixed, is_simulated, joint_list, summary, two_digits
 
 
 def report_html(calibration: Calibration) -> str:
@@ -59,16 +60,16 @@ def report_page(calibration: Calibration) -> Page:
 
 
 def _findings(calibration: Calibration) -> Section:
-    clear = [f for f in calibration.findings if f.significant]
+    clear = sorted((f for f in calibration.findings if f.significant), key=lambda f: f.std == 0)
     rest = [f for f in calibration.findings if not f.significant]
     first = "▲ marks what exceeds two standard uncertainties; the number after ± is one standard uncertainty."
     return Section(
         id="findings",
         title="Findings",
         paragraphs=(first if clear else "Nothing exceeds two standard uncertainties.",),
-        items=tuple(Item(typeset(f.text), True) for f in clear),
+        items=tuple(Item(as_sentence(f.text), True) for f in clear),
         minor_title="Not significant: within two standard uncertainties of the design" if rest else "",
-        minor_items=tuple(typeset(f.text) for f in rest),
+        minor_items=tuple(as_sentence(f.text) for f in rest),
     )
 
 
@@ -79,8 +80,12 @@ def _measured(calibration: Calibration) -> Section:
 def _geometry(calibration: Calibration) -> Section:
     figure = deviations_figure(calibration)
     if figure is None:
-        missing = joint_list(calibration.not_swept or calibration.not_moved or (1,))
-        text = f"The parameters of the links need a sweep of every joint, and {missing} has none that can be used."
+        absent = tuple(sorted({*calibration.not_swept, *calibration.not_moved}))
+        text = "The parameters of the links need a sweep of every joint"
+        if absent:
+            have = "has" if len(absent) == 1 else "have"
+            text += f"; {joint_list(absent)} {have} none that can be used"
+        text += "."
         if calibration.campaign.robot.joint_count < 2:
             text = "An arm with a single joint has no links between axes, so there is no geometry to compare."
         return Section("geometry", "Geometry", paragraphs=(text,))
@@ -101,8 +106,9 @@ def _drives(calibration: Calibration) -> Section:
         if fit is not None
     )
     text = (
-        "Above: commanded minus actual displacement as measured (points) and the fitted function (line) with its 95 % "
-        "band. The band holds the uncertainty of the axis, which moves all points together. Below: what is left."
+        "Error: commanded minus actual displacement, as measured (points) and by the fitted function (line) with its "
+        "95 % band. The band holds the uncertainty of the axis, which moves all points together. Left over: what the "
+        "function does not explain."
     )
     after = (shown_constants(calibration, "transmission"), shown_candidates(calibration, "transmission"))
     return Section(
@@ -121,8 +127,8 @@ def _couplings(calibration: Calibration) -> Section | None:
         return None
     unseen = [c for c in robot.couplings if fits[c.target - 1] is None]
     text = (
-        "The motor of one joint moves the next joint as well. Above: that motion less the nominal one; below: what is "
-        "left."
+        "The motor of one joint moves the next joint as well. Error: that passive motion less the nominal one, as "
+        "measured (points) and by the fitted function (line). Left over: what the function does not explain."
     )
     lines = [
         f"Joint {c.target} is dragged along by joint {c.source} with a nominal gain of {fixed(c.gain, 4)}; no second "
@@ -163,7 +169,8 @@ def _residuals(calibration: Calibration) -> Section:
     thin = thinned_sweeps(calibration)
     if thin:
         texts.append(
-            f"Of {'; '.join(thin)} only some of the points are drawn, the largest residuals always among them."
+            f"Of {'; '.join(thin)} only some of the points are drawn, here and above, "
+            "the largest residuals always among them."
         )
     plots = tuple(
         Plot(residual_figure(calibration, k), _residual_caption(calibration, k))
@@ -209,8 +216,8 @@ def _fit_words(fit: FunctionFit, unit: str, scale: float) -> str:
     before, after = fixed(fit.rms_before * scale, digits), fixed(fit.rms_after * scale, digits)
     family = family_words(fit.form.name)
     if len(fit.coefficients) == 0:
-        return f"Family: {family}, no constants. RMS {after} {unit}. Family {fit.reason}."
-    return f"Family: {family}. RMS {before} {unit} before, {after} {unit} after. Family {fit.reason}."
+        return f"Family: {family}, no constants. RMS {after} {unit}. Why: {reason_words(fit.reason)}."
+    return f"Family: {family}. RMS {before} {unit} before, {after} {unit} after. Why: {reason_words(fit.reason)}."
 
 
 def _residual_caption(calibration: Calibration, index: int) -> str:
@@ -219,4 +226,5 @@ def _residual_caption(calibration: Calibration, index: int) -> str:
     residuals = calibration.refinement.residuals
     used = residuals.used[rows]
     length = np.linalg.norm(residuals.residual_m[rows][used], axis=1)
-    return f"RMS length of the residuals in space: {1e3 * np.sqrt(np.mean(length**2)):.2g} mm, {used.sum()} points."
+    rms = two_digits(1e3 * float(np.sqrt(np.mean(length**2))))
+    return f"{used.sum()} points, RMS length of their residuals in space {rms} mm."

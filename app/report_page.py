@@ -7,7 +7,6 @@ from a file is escaped, by the template or here.
 import json
 from dataclasses import dataclass, field
 from functools import lru_cache
-from html import escape
 
 import jinja2
 import plotly.graph_objects as go
@@ -16,6 +15,9 @@ from plotly.offline import get_plotlyjs
 from app.figures.style import CONFIG
 from app.paths import static_folder
 from core.version import VERSION
+
+MOST_ROWS_TOGETHER = 28
+"""A table with no more rows than this is not parted by the end of a sheet."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,12 @@ class ShownTable:
     groups: tuple[tuple[tuple[Cell, ...], ...], ...]
     note: str = ""
     dense: bool = False
+
+    @property
+    def style(self) -> str:
+        """Names of styles: a short table is kept on one sheet of paper."""
+        short = sum(len(group) for group in self.groups) <= MOST_ROWS_TOGETHER
+        return " ".join(["table", *(["dense"] if self.dense else []), *(["together"] if short else [])])
 
 
 @dataclass(frozen=True)
@@ -140,8 +148,3 @@ def _plotly_script() -> str:
 def _css_string(text: str) -> str:
     """A string of CSS that holds any text: whatever is not a letter, digit or space is written as its number."""
     return "".join(c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in text)
-
-
-def strong(text: str) -> str:
-    """Escaped text in bold, for labels that plotly reads as markup."""
-    return f"<b>{escape(text, quote=False)}</b>"

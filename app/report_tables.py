@@ -1,5 +1,6 @@
 """The tables of a calibration as the report shows them."""
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -31,6 +32,7 @@ FAMILIES = {
     "proportional": "proportional",
     "arctangent": "four-bar linkage",
 }
+METHODS = {"all points at once": "all points", "joint by joint": "joint by joint"}
 MOST_REJECTED = 60
 """Rows of the table of rejected points; the rest is in the CSV file."""
 
@@ -71,7 +73,9 @@ def shown_sweeps(calibration: Calibration) -> ShownTable:
         ]
         for r in table.frame.itertuples()
     ]
-    return ShownTable(f"Table 1. {table.title}", headings, aligned([[row] for row in rows]), table.note)
+    return ShownTable(
+        "Table 1. Sweeps in the order of measurement", headings, aligned([[row] for row in rows]), table.note
+    )
 
 
 def shown_axes(calibration: Calibration) -> ShownTable:
@@ -79,7 +83,7 @@ def shown_axes(calibration: Calibration) -> ShownTable:
     table = axes_table(calibration)
     headings = (
         Heading("Joint"),
-        Heading("Method", "All points at once is the result; joint by joint is the start from which it was found"),
+        Heading("Method", "All points fitted at once: the result. Joint by joint: the start from which it was found"),
         Heading("x [mm]", "A point on the axis, in the instrument's frame", True),
         Heading("y [mm]", numeric=True),
         Heading("z [mm]", numeric=True),
@@ -96,7 +100,7 @@ def shown_axes(calibration: Calibration) -> ShownTable:
         [_axis_cells(r, k, len(part)) for k, r in enumerate(part.itertuples())]
         for _, part in table.frame.groupby("joint", sort=False)
     ]
-    return ShownTable("Table 2. Joint axes", headings, aligned(groups), table.note, dense=True)
+    return ShownTable("Table 3. Joint axes", headings, aligned(groups), table.note, dense=True)
 
 
 def shown_parameters(calibration: Calibration) -> ShownTable:
@@ -121,7 +125,7 @@ def shown_parameters(calibration: Calibration) -> ShownTable:
         name = Cell(f"{frame}  (φ = {rows[0].phi_deg:.6g}°)", rows=len(rows), heading=True)
         groups.append([[name, *_parameter_cells(rows[0])], *(_parameter_cells(r) for r in rows[1:])])
     note = "Fixed: set by the choice of frames, so that it can neither be measured nor be wrong."
-    return ShownTable("Table 3. Geometry: nominal and actual", headings, aligned(groups), note)
+    return ShownTable("Table 2. Geometry: nominal and actual", headings, aligned(groups), note)
 
 
 def shown_drives(calibration: Calibration) -> ShownTable:
@@ -264,8 +268,14 @@ def family_words(name: str) -> str:
     return f"1 to {orders} times a turn" if orders != name else FAMILIES.get(name, name)
 
 
+def reason_words(reason: str) -> str:
+    """Why a family was chosen, with families as a person says them."""
+    said = re.sub(r"\b(first_harmonic|harmonics_\d+)\b", lambda name: family_words(name[0]), reason)
+    return said.replace("1e+06 times more so", "over a million times more so")
+
+
 def _axis_cells(r: tuple, index: int, rows: int) -> list[Cell]:
-    first = [Cell(f"{r.joint} ({'slides' if r.kind == 'prismatic' else 'turns'})", rows=rows, heading=True)]
+    first = [Cell(f"{r.joint}{' (slides)' if r.kind == 'prismatic' else ''}", rows=rows, heading=True)]
     place = [number(v, r.point_std_mm) for v in (r.x_mm, r.y_mm, r.z_mm)]
     if not np.isfinite(r.x_mm):
         place = [Cell("no place of its own", mark="muted", columns=3)]
@@ -273,7 +283,7 @@ def _axis_cells(r: tuple, index: int, rows: int) -> list[Cell]:
     digits = decimals_for(r.direction_std_rad, 6)
     return [
         *(first if index == 0 else []),
-        Cell(r.method),
+        Cell(METHODS[r.method]),
         *place,
         uncertainty(r.point_std_mm),
         *(number(v, decimals=digits) for v in (r.direction_x, r.direction_y, r.direction_z)),
@@ -303,7 +313,7 @@ def _parameter_cells(r: tuple) -> list[Cell]:
         number(r.actual, r.std),
         number(r.difference, r.std),
         uncertainty(r.std),
-        number(r.significance, decimals=1),
+        number(r.significance, decimals=2),
         Cell("▲ significant" if r.significant else "○ within 2 u", mark=mark),
         number(r.joint_by_joint, r.joint_by_joint_std),
         uncertainty(r.joint_by_joint_std),
@@ -357,7 +367,7 @@ def _function_cells(r: tuple) -> list[Cell]:
         number(r.rms_before, decimals=digits),
         number(r.rms_after, decimals=digits),
         Cell(r.unit),
-        Cell(r.reason),
+        Cell(reason_words(r.reason)),
     ]
 
 

@@ -4,13 +4,15 @@ import numpy as np
 
 from core.calibration import Calibration
 from core.geometry import Array
+from core.robot import JointKind
 from core.version import VERSION
-from core.wording import duration, stated_noise_m
+from core.wording import duration, stated_noise_m, two_digits
 
 ESTIMATORS = {
     "likelihood": "maximum likelihood with the points' covariances",
     "paper": "Sultan and Wager's least squares (equations 3 to 5)",
 }
+KINDS = {JointKind.REVOLUTE: "turning", JointKind.PRISMATIC: "sliding", JointKind.PASSIVE: "passive"}
 COMMANDS = {
     "commanded": "as commanded",
     "goal": "a planner's goals",
@@ -70,15 +72,18 @@ TERMS = (
 def facts(calibration: Calibration) -> tuple[tuple[str, str], ...]:
     """Object, instrument and conditions, label and value; what nobody recorded is left out or said to be unknown."""
     campaign, table = calibration.campaign, calibration.campaign.measurements
-    kinds = [joint.kind.value for joint in campaign.robot.joints]
+    kinds = [KINDS[joint.kind] for joint in campaign.robot.joints]
     joints = ", ".join(f"{kinds.count(k)} {k}" for k in dict.fromkeys(kinds))
     stated = stated_noise_m(calibration)
     found = [
         ("Robot", campaign.robot.name),
         ("Joints", f"{len(kinds)} ({joints})"),
-        ("Instrument", campaign.instrument.kind),
+        ("Instrument", campaign.instrument.kind.replace("-", " ")),
         *((_label(key), str(value)) for key, value in campaign.instrument.description.items()),
-        ("Stated noise", "none" if stated is None else f"{stated * 1e3:.2g} mm, one coordinate (RMS over the points)"),
+        (
+            "Stated noise",
+            "none" if stated is None else f"{two_digits(stated * 1e3)} mm, one coordinate",
+        ),
         ("Joint values", COMMANDS.get(campaign.joint_values, campaign.joint_values)),
         ("Air temperature", _range(table.temperature_c, "°C")),
         ("Arm temperature", _range(table.arm_temperature_c, "°C")),
@@ -100,9 +105,9 @@ def key_numbers(calibration: Calibration) -> tuple[tuple[str, str], ...]:
     judged = [f for f in calibration.findings if f.std > 0]
     return (
         ("Significant deviations", f"{sum(f.significant for f in judged)} of {len(judged)}"),
-        ("Noise σ estimated", f"{calibration.estimate.noise_m * 1e3:.2g} mm"),
-        ("Noise σ stated", "none" if stated is None else f"{stated * 1e3:.2g} mm"),
-        ("Residuals, RMS length", f"{1e3 * np.sqrt(np.mean(length**2)):.2g} mm"),
+        ("Noise σ estimated", f"{two_digits(calibration.estimate.noise_m * 1e3)} mm"),
+        ("Noise σ stated", "none" if stated is None else f"{two_digits(stated * 1e3)} mm"),
+        ("Residuals, RMS length", f"{two_digits(1e3 * np.sqrt(np.mean(length**2)))} mm"),
         ("Points used", f"{used.sum()}"),
         ("Points rejected", f"{(~used).sum()}"),
     )

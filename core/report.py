@@ -368,7 +368,7 @@ def _function_row(fit: FunctionFit, slides: bool) -> dict[str, object]:
     unit, scale = display_unit(slides)
     return {
         "family": fit.form.name,
-        "formula": fit.form.formula,
+        "formula": "; ".join([fit.form.formula, *(f"{k} = {v:.6g}" for k, v in fit.form.constants().items())]),
         "rms_before": fit.rms_before * scale,
         "rms_after": fit.rms_after * scale,
         "unit": unit,
@@ -385,7 +385,7 @@ def _axis_row(calibration: Calibration, estimate: ArmEstimate, joint: int) -> di
         axial, radial, points = residuals.axial_m[mine], residuals.radial_m[mine], int(mine.sum())
     else:
         fits = [f.fit for f in calibration.found.fits if f.sweep.joint == joint]
-        axial = np.concatenate([f.axial_m[f.used] for f in fits])
+        axial = np.concatenate([np.where(f.sliding, np.nan, f.axial_m[f.used]) for f in fits])
         across = [np.hypot(f.radial_m, f.tangential_m) if f.sliding else f.radial_m for f in fits]
         radial = np.concatenate([a[f.used] for a, f in zip(across, fits, strict=True)])
         points = len(axial)

@@ -1,5 +1,7 @@
 """Numbers and facts put into words: rounding to the uncertainty, units of joints, what a calibration says in short."""
 
+import re
+
 import numpy as np
 
 from core.calibration import Calibration
@@ -48,8 +50,19 @@ def with_uncertainty(value: float, std: float, unit: str = "") -> str:
 
 
 def typeset(text: str) -> str:
-    """A sentence of plain ASCII with the signs that print uses."""
-    return text.replace(" +- ", " ± ").replace(" -", " \N{MINUS SIGN}")
+    """A sentence of plain ASCII with the signs that print uses, and a unit that is said twice said once."""
+    text = text.replace(" +- ", " ± ").replace(" -", " \N{MINUS SIGN}")
+    return re.sub(r" (mm|deg|%) ± ([0-9.]+) \1", r" ± \2 \1", text)
+
+
+def as_sentence(text: str) -> str:
+    """A finding as a sentence of its own."""
+    return typeset(f"{text[:1].upper()}{text[1:]}.")
+
+
+def two_digits(value: float) -> str:
+    """A positive number with two digits, trailing zero and all: 0.020."""
+    return fixed(value, decimals_for(value))
 
 
 def is_simulated(campaign: Campaign) -> bool:
@@ -105,9 +118,9 @@ def _compared(calibration: Calibration) -> str:
     count = sum(f.significant for f in judged)
     beyond = "by more than two standard uncertainties"
     if count == 0:
-        return f"None of the {len(judged)} quantities that were compared differs from the design {beyond}."
-    verb = "differs" if count == 1 else "differ"
-    return f"{count} of the {len(judged)} quantities that were compared {verb} from the design {beyond}."
+        return f"No quantity that was compared ({len(judged)} in all) differs from the design {beyond}."
+    verb = "quantity differs" if count == 1 else "quantities differ"
+    return f"{count} {verb} from the design {beyond}; {len(judged)} in all were compared."
 
 
 def _strongest(calibration: Calibration) -> str:
@@ -133,21 +146,22 @@ def _zeros(calibration: Calibration) -> str:
 
 def _noise(calibration: Calibration) -> str:
     found, stated = calibration.estimate.noise_m * 1e3, stated_noise_m(calibration)
-    text = f"One coordinate of a point scatters by {found:.2g} mm (standard deviation)"
+    text = f"One coordinate of a point scatters by {two_digits(found)} mm (standard deviation)"
     if stated is None:
         return f"{text}, estimated from the points; the campaign states none."
     ratio, stated = found / (stated * 1e3), stated * 1e3
     if ratio > 1.1:
-        return f"{text}, {ratio:.2g} times the {stated:.2g} mm that were stated for the instrument."
+        return f"{text}, {ratio:.1f} times the {two_digits(stated)} mm that were stated for the instrument."
     if ratio < 0.9:
-        return f"{text}, less than the {stated:.2g} mm that were stated for the instrument."
-    return f"{text}, as stated for the instrument ({stated:.2g} mm)."
+        return f"{text}, less than the {two_digits(stated)} mm that were stated for the instrument."
+    return f"{text}, as stated for the instrument ({two_digits(stated)} mm)."
 
 
 def _points(calibration: Calibration) -> str:
     used = calibration.refinement.residuals.used
     left = int((~used).sum())
-    points = f"{used.sum()} points of {len(calibration.found.fits)} sweeps were used"
+    sweeps = len(calibration.found.fits)
+    points = f"{used.sum()} points of {sweeps} sweep{'s' if sweeps > 1 else ''} were used"
     if left == 0:
         return f"{points}; none was rejected."
     return f"{points}; {left} {'was' if left == 1 else 'were'} rejected."

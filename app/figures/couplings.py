@@ -30,10 +30,9 @@ def coupling_figure(calibration: Calibration, joint: int) -> go.Figure:
     fitted = fitted_curve(fit, low / below_scale, high / below_scale, gain, False, 1.0)
     fitted = type(fitted)(fitted.x * below_scale, fitted.deviation * scale, fitted.std * scale)
     return curve_figure(
-        f"Joint {joint} dragged along by joint {joint - 1}",
+        f"Joint {joint}, dragged along by joint {joint - 1}",
         tuple(observed),
         fitted,
         f"active displacement of joint {joint - 1} [{below_unit}]",
-        f"passive − nominal [{unit}]",
         unit,
     )

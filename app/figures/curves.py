@@ -59,29 +59,23 @@ def fitted_curve(fit: FunctionFit, low: float, high: float, slope: float, home: 
     return Fitted(x * scale, (value - slope * x) * scale, np.sqrt(np.maximum(variance, 0.0)) * scale)
 
 
-def curve_figure(
-    title: str, observed: tuple[Observed, ...], fitted: Fitted, x_title: str, y_title: str, unit: str
-) -> go.Figure:
-    """Deviations before the fit with the fitted curve, and residuals after it, one above the other."""
-    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.07, row_heights=[0.58, 0.42])
+def curve_figure(title: str, observed: tuple[Observed, ...], fitted: Fitted, x_title: str, unit: str) -> go.Figure:
+    """Errors before the fit with the fitted curve, and what is left after it, one above the other."""
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.07, row_heights=[0.56, 0.44])
     if fitted.std.max() > 0:
         low, high = fitted.deviation - COVERAGE * fitted.std, fitted.deviation + COVERAGE * fitted.std
-        figure.add_trace(band(fitted.x, low, high, "its 95 % band"), row=1, col=1)
+        figure.add_trace(band(fitted.x, low, high, "95 % band"), row=1, col=1)
     figure.add_trace(_line(fitted), row=1, col=1)
-    spread = np.sqrt(np.mean(np.concatenate([o.std for o in observed]) ** 2))
-    ends = fitted.x[[0, -1]]
-    noise = band(ends, np.full(2, -2 * spread), np.full(2, 2 * spread), "±2σ of one stop", NOISE_BAND)
+    spread = float(np.sqrt(np.mean(np.concatenate([o.std for o in observed]) ** 2)))
+    noise = band(fitted.x[[0, -1]], np.full(2, -2 * spread), np.full(2, 2 * spread), "±2σ of a stop", NOISE_BAND)
     figure.add_trace(noise, row=2, col=1)
     for index, one in enumerate(observed):
         _add_observed(figure, one, index, len(observed) > 1, unit)
-    styled(figure, title, 344)
-    figure.update_layout(margin={"b": 86})
-    figure.update_yaxes(title_text=y_title, row=1, col=1)
-    figure.update_yaxes(title_text=f"left over [{unit}]", row=2, col=1)
-    figure.update_yaxes(
-        range=symmetric_range(*(o.after for o in observed), np.atleast_1d(2 * spread)), row=2, col=1, nticks=5
-    )
-    figure.update_xaxes(title_text=x_title, title_standoff=4, row=2, col=1)
+    styled(figure, title, 205)
+    limits = symmetric_range(*(o.after for o in observed), np.atleast_1d(2 * spread))
+    figure.update_yaxes(title_text=f"error [{unit}]", nticks=6, row=1, col=1)
+    figure.update_yaxes(title_text=f"left over [{unit}]", range=limits, nticks=5, row=2, col=1)
+    figure.update_xaxes(title_text=x_title, title_standoff=6, row=2, col=1)
     return figure
 
 
@@ -91,23 +85,27 @@ def _line(fitted: Fitted) -> go.Scatter:
         y=fitted.deviation,
         mode="lines",
         line={"color": BLACK, "width": 1.6},
-        name="fitted function",
+        name="fit",
         hoverinfo="skip",
     )
 
 
 def _add_observed(figure: go.Figure, one: Observed, index: int, several: bool, unit: str) -> None:
     drawn = thinned(len(one.x), one.after)
-    marker = {"color": SERIES[index % len(SERIES)], "symbol": SYMBOLS[index % len(SYMBOLS)], "size": 5}
+    marker = {
+        "color": SERIES[index % len(SERIES)],
+        "symbol": SYMBOLS[index % len(SYMBOLS)],
+        "size": 5 if len(drawn) < 300 else 3,
+    }
     for row, values in ((1, one.before), (2, one.after)):
         trace = go.Scatter(
             x=one.x[drawn],
             y=values[drawn],
             mode="markers",
             marker=marker,
-            name=one.name if several else "measured",
+            name=one.name,
             legendgroup=one.name,
-            showlegend=row == 1,
+            showlegend=several and row == 1,
             hovertemplate=f"%{{x:.3f}}: %{{y:.4f}} {unit}<extra>{one.name}</extra>",
         )
         figure.add_trace(trace, row=row, col=1)

@@ -26,12 +26,12 @@ def deviations_figure(calibration: Calibration) -> go.Figure | None:
             mine = (part["significant"] == significant).to_numpy()
             figure.add_trace(_trace(part, np.array(names, dtype=object), mine, column == 1), row=1, col=column)
         figure.update_yaxes(categoryorder="array", categoryarray=names[::-1], row=1, col=column)
-        figure.update_xaxes(title_text=f"actual − nominal [{unit}]", title_standoff=4, row=1, col=column)
+        figure.update_xaxes(title_text=f"actual − nominal [{unit}]", title_standoff=6, row=1, col=column)
     rows = max((table["unit"] == "mm").sum(), (table["unit"] == "deg").sum())
-    styled(figure, "Geometry: deviation from the design, with ±2 standard uncertainties", 24 * int(rows) + 120, WIDE_PX)
+    styled(figure, "Geometry: deviation from the design, with ±2 standard uncertainties", 22 * int(rows) + 12, WIDE_PX)
     figure.update_xaxes(zeroline=True, zerolinecolor=GREY, zerolinewidth=1.5)
     figure.update_yaxes(zeroline=False, tickfont_size=12)
-    figure.update_layout(margin={"l": 40, "b": 72})
+    figure.update_layout(margin={"l": 40})
     return figure
 
 

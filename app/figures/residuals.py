@@ -38,11 +38,10 @@ def residual_figure(calibration: Calibration, index: int) -> go.Figure:
         ends, width = np.array([x.min(), x.max()]), np.full(2, 2 * direction.sigma)
         figure.add_trace(band(ends, -width, width, "±2σ expected", NOISE_BAND, row == 1), row=row, col=1)
         _add_points(figure, calibration, found, x, direction.value, used, limits[1], row)
-    styled(figure, f"Joint {found.sweep.joint}, sweep {found.sweep.number}", 110 * len(directions) + 96)
-    figure.update_layout(margin={"b": 86})
+    styled(figure, f"Joint {found.sweep.joint}, sweep {found.sweep.number}", 104 * len(directions))
     for row, direction in enumerate(directions, 1):
         figure.update_yaxes(title_text=direction.title, range=limits, nticks=5, row=row, col=1)
-    figure.update_xaxes(title_text=f"commanded [{unit}]", title_standoff=4, row=len(directions), col=1)
+    figure.update_xaxes(title_text=f"commanded [{unit}]", title_standoff=6, row=len(directions), col=1)
     return figure
 
 

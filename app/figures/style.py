@@ -13,6 +13,8 @@ from core.geometry import Array
 
 WIDTH_PX = 340
 """Of one small figure; two stand side by side on A4 paper."""
+TOP_PX = 32
+"""Height of the title."""
 WIDE_PX = 690
 """Of a figure over the whole width of the paper."""
 MOST_POINTS = 2000
@@ -36,33 +38,42 @@ CONFIG = {
 """For ``Plotly.newPlot``."""
 
 
-def plain(text: str) -> str:
-    """Text from a file, to be shown as it is: plotly reads a little HTML in its labels."""
-    return escape(text, quote=False)
+def plain(text: str, longest: int = 24) -> str:
+    """Text from a file, cut if it is long, to be shown as it is: plotly reads a little HTML in its labels."""
+    short = text if len(text) <= longest else f"{text[: longest - 1]}…"
+    return escape(short, quote=False)
 
 
-def styled(figure: go.Figure, title: str, height_px: int, width_px: int = WIDTH_PX) -> go.Figure:
-    """Give a figure the common look; ``title`` must be free of markup that is not meant."""
+def styled(
+    figure: go.Figure, title: str, panels_px: int, width_px: int = WIDTH_PX, legend_rows: int | None = None
+) -> go.Figure:
+    """Give a figure the common look.
+
+    Args:
+        figure: changed in place, and returned.
+        title: free of markup that is not meant.
+        panels_px: height of the panels, without title, axis and legend.
+        width_px: of the whole figure.
+        legend_rows: lines of the legend; None: as many as its names need.
+    """
+    rows = lines_of_legend(figure, width_px) if legend_rows is None else legend_rows
+    bottom = 46 + 18 * rows
     figure.update_layout(
-        title={
-            "text": f"<b>{title}</b>",
-            "x": 0.0,
-            "xref": "container",
-            "xanchor": "left",
-            "y": 1.0,
-            "yref": "container",
-        },
+        title={"text": f"<b>{title}</b>", "x": 0.0, "xref": "container", "xanchor": "left", "y": 1.0},
         title_font_size=13,
+        title_yref="container",
         title_yanchor="top",
         title_pad={"t": 7, "l": 4},
         width=width_px,
-        height=height_px,
-        margin={"l": 58, "r": 10, "t": 34, "b": 64},
+        height=TOP_PX + panels_px + bottom,
+        margin={"l": 56, "r": 10, "t": TOP_PX, "b": bottom, "autoexpand": False},
         font={"family": FONT, "size": 11, "color": BLACK},
         paper_bgcolor="white",
         plot_bgcolor="white",
-        legend={"orientation": "h", "x": 0, "xanchor": "left", "y": 0, "yref": "container", "yanchor": "bottom"},
+        legend={"orientation": "h", "x": 0.01, "xref": "container", "xanchor": "left", "y": 0.0, "yref": "container"},
+        legend_yanchor="bottom",
         legend_font_size=10.5,
+        legend_tracegroupgap=0,
         hoverlabel={"font_size": 11},
         template="none",
     )
@@ -71,6 +82,19 @@ def styled(figure: go.Figure, title: str, height_px: int, width_px: int = WIDTH_
     figure.update_xaxes(**axes, zeroline=False)
     figure.update_yaxes(**axes, zeroline=True, zerolinecolor="#9aa1ab", zerolinewidth=1)
     return figure
+
+
+def lines_of_legend(figure: go.Figure, width_px: int) -> int:
+    """How many lines the legend takes, by the widths of its names."""
+    lines, at = 1, 0.0
+    for trace in figure.data:
+        if trace.showlegend is False:
+            continue
+        width = 48 + 6.3 * len(trace.name or "")
+        if at > 0 and at + width > width_px - 8:
+            lines, at = lines + 1, 0.0
+        at += width
+    return lines
 
 
 def thinned(count: int, keep: Array | None = None, most: int = MOST_POINTS) -> np.ndarray:

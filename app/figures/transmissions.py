@@ -27,10 +27,9 @@ def transmission_figure(calibration: Calibration, joint: int) -> go.Figure:
     low, high = min(o.x.min() for o in observed) / scale, max(o.x.max() for o in observed) / scale
     fitted = fitted_curve(fit, low, high, 1.0, calibration.campaign.home is not None, scale)
     return curve_figure(
-        f"Joint {joint}: drive",
+        f"Joint {joint}: commanded − actual",
         tuple(observed),
         fitted,
         f"actual displacement [{unit}]",
-        f"commanded − actual [{unit}]",
         unit,
     )
