@@ -1,0 +1,29 @@
+"""``python -m tests.benchmarks axes|speed``: a table in Markdown, the same numbers every time but for the clock."""
+
+import os
+
+# Before numpy is imported: one thread, so that times compare.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"
+
+import argparse  # noqa: E402
+
+
+def main() -> None:
+    """Print the table that was asked for."""
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
+    parser.add_argument("what", choices=("axes", "speed"))
+    parser.add_argument("--sweeps", type=int, default=4000, help="simulated sweeps for each row of 'axes'")
+    asked = parser.parse_args()
+    if asked.what == "axes":
+        from tests.benchmarks.axis_efficiency import table
+
+        print(table(asked.sweeps))
+    else:
+        from tests.benchmarks.axis_speed import report
+
+        print(report())
+
+
+if __name__ == "__main__":
+    main()
