@@ -25,7 +25,7 @@ CALIBRATION = """
     core.motion_forms core.arm core.function_fit core.drives core.transmission
     core.estimate core.phi_uncertainty core.arm_jacobian core.coupling
     core.walk_from_base core.joint_by_joint core.refinement_problem core.refined_curves core.refinement
-    core.findings core.calibration
+    core.live_sweep core.findings core.calibration
 """
 RESULTS = """
     core.wording core.report core.json_values core.axis_json core.motion_json core.calibration_json
