@@ -1,15 +1,17 @@
 """The report's page: that it holds what it should, escapes what it must, and stays small."""
 
 import html
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import plotly.graph_objects as go
 import pytest
 
 from app.report_cells import aligned, number, uncertainty
 from app.report_html import report_html, report_page
-from app.report_page import Cell
+from app.report_page import Cell, Plot
 from app.report_tables import family_words, reason_words, shown_parameters
 from core.calibration import calibrate
 from core.twin import scara
@@ -86,6 +88,13 @@ def test_texts_from_files_stay_texts():
     assert tags.count("script") == 2 + sum(len(s.plots) for s in report_page(hostile()).sections)
     assert "window.broken=1" in page
     assert HOSTILE in html.unescape(page)
+
+
+def test_a_figure_s_data_cannot_end_its_script():
+    text = "</script><!-- & ' \" \u2028"
+    written = Plot(go.Figure(layout={"title": {"text": text}}), "").json
+    assert not set("<>&") & set(written)
+    assert json.loads(written)["layout"]["title"]["text"] == text
 
 
 def test_simulated_campaigns_say_so_and_others_do_not():
