@@ -49,47 +49,11 @@ def tables(calibration: Calibration) -> tuple[Table, ...]:
 
 def sweeps_table(calibration: Calibration) -> Table:
     """Table 1 as acquired: one row a sweep, in the order of measurement."""
-    campaign, rows = calibration.campaign, []
-    names = [t.name for t in campaign.targets]
-    for order, (found, here) in enumerate(sweep_rows(calibration), 1):
-        sweep, used = found.sweep, calibration.refinement.residuals.used[here]
-        unit, scale = display_unit(campaign.robot.joints[sweep.joint - 1].slides)
-        travel = sweep.commanded[:, sweep.joint - 1] * scale
-        stops, seen = len(travel), np.unique(sweep.target)
-        whole = len(seen) * stops
-        counted = f"{len(seen)} x {stops}" if len(seen) > 1 else str(stops)
-        rows.append(
-            {
-                "order": order,
-                "joint": sweep.joint,
-                "sweep": sweep.number,
-                "first": travel[0],
-                "last": travel[-1],
-                "span": np.ptp(travel),
-                "unit": unit,
-                "intervals": stops - 1,
-                "points": counted if whole == len(sweep.rows) else f"{len(sweep.rows)} of {counted}",
-                "extra_point": "yes" if len(found.axis_rows) < len(sweep.rows) else "no",
-                "targets": ", ".join(names[k] for k in dict.fromkeys(sweep.target.tolist())),
-                "used": int(used.sum()),
-                "rejected": int((~used).sum()),
-            }
-        )
-    columns = [
-        "order",
-        "joint",
-        "sweep",
-        "first",
-        "last",
-        "span",
-        "unit",
-        "intervals",
-        "points",
-        "extra_point",
-        "targets",
-        "used",
-        "rejected",
+    rows = [
+        {"order": order, **_sweep_row(calibration, found, calibration.refinement.residuals.used[here])}
+        for order, (found, here) in enumerate(sweep_rows(calibration), 1)
     ]
+    columns = _columns("order joint sweep first last span unit intervals points extra_point targets used rejected")
     note = (
         "Spans are of the commanded displacement. An extra point rides beyond the next joint: it shows how far that "
         "joint is dragged along."
@@ -362,6 +326,28 @@ def constant_unit(fit: FunctionFit, name: str) -> str:
 
 
 _FUNCTION_COLUMNS = ("family", "formula", "rms_before", "rms_after", "unit", "reason")
+
+
+def _sweep_row(calibration: Calibration, found: SweepFit, used: np.ndarray) -> dict[str, object]:
+    campaign, sweep = calibration.campaign, found.sweep
+    unit, scale = display_unit(campaign.robot.joints[sweep.joint - 1].slides)
+    travel = sweep.commanded[:, sweep.joint - 1] * scale
+    stops, seen = len(travel), len(np.unique(sweep.target))
+    counted = f"{seen} x {stops}" if seen > 1 else str(stops)
+    return {
+        "joint": sweep.joint,
+        "sweep": sweep.number,
+        "first": travel[0],
+        "last": travel[-1],
+        "span": np.ptp(travel),
+        "unit": unit,
+        "intervals": stops - 1,
+        "points": counted if seen * stops == len(sweep.rows) else f"{len(sweep.rows)} of {counted}",
+        "extra_point": "yes" if len(found.axis_rows) < len(sweep.rows) else "no",
+        "targets": ", ".join(campaign.targets[k].name for k in dict.fromkeys(sweep.target.tolist())),
+        "used": int(used.sum()),
+        "rejected": int((~used).sum()),
+    }
 
 
 def _function_row(fit: FunctionFit, slides: bool) -> dict[str, object]:
