@@ -17,7 +17,7 @@ last step gives the covariance. The angles are incidental parameters, so the bou
 Kanatani (1998, doi 10.1109/34.667887) and Chernov and Lesort (2004, doi 10.1016/j.csda.2003.10.008).
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from core.axes.points import SweepPoints, require_points
 from core.axes.result import AxisFit, outlier_probabilities
 from core.axes.rotary_rows import RotaryState, Rows, moved, rows_at, state_at
 from core.errors import AxisUndefined, NotConverged
-from core.geometry import Array, Line, perpendicular_basis
+from core.geometry import Array, Line
 
 HUBER_LIMIT = 2.0
 """Residual length, in standard deviations, beyond which the robust fit reins a point in."""
@@ -61,8 +61,20 @@ def fit_rotary_axis(points: SweepPoints, robust: bool = False) -> AxisFit:
     require_points(points, unknown, 2, 4)
     state = _best_start(points, robust)
     if points.covariance_m2 is not None:
-        state = _refine(points, state, robust, weights_of=state, tolerance=1e-3)[0]
-    return _result(points, *_refine(points, state, robust, weights_of=state))
+        state = _refine(points, state, robust, weights_of=state, tolerance=1e-3).state
+    return _result(points, _refine(points, state, robust, weights_of=state))
+
+
+@dataclass(frozen=True)
+class _Optimum:
+    """Where Gauss-Newton ended."""
+
+    state: RotaryState
+    rows: Rows
+    weight: Array | None
+    """Of each point, in a robust fit."""
+    covariance: Array
+    """Inverse of the information matrix, (p, p)."""
 
 
 def _best_start(points: SweepPoints, robust: bool) -> RotaryState:
@@ -80,14 +92,14 @@ def _best_start(points: SweepPoints, robust: bool) -> RotaryState:
     if sagitta < min(FLAT_ARC * across, SHORT_ARC * chord):
         states.append(state_at(points, arc_start(points)))
     if len(states) == 1 and not many:
-        return _refine(points, states[0], robust, tolerance=1e-2)[0] if skew else states[0]
+        return _refine(points, states[0], robust, tolerance=1e-2).state if skew else states[0]
     found = [refined for state in states if (refined := _try_refine(points, state, robust))]
     if not found:
         raise NotConverged("the fit of a joint axis did not converge in 100 steps")
-    return min(found, key=lambda refined: refined[1].cost)[0]
+    return min(found, key=lambda refined: refined.rows.cost).state
 
 
-def _try_refine(points: SweepPoints, state: RotaryState, robust: bool) -> tuple[RotaryState, Rows, Array | None] | None:
+def _try_refine(points: SweepPoints, state: RotaryState, robust: bool) -> _Optimum | None:
     """From one of several starts; a start that leads nowhere is no error."""
     try:
         return _refine(points, state, robust)
@@ -101,7 +113,7 @@ def _refine(
     robust: bool,
     weights_of: RotaryState | None = None,
     tolerance: float = 1e-7,
-) -> tuple[RotaryState, Rows, Array | None]:
+) -> _Optimum:
     """Gauss-Newton with step halving, from a state to the least sum of squares.
 
     Skew noise is resolved into axial, radial and tangential parts as they are at ``weights_of``, and held so: weights
@@ -112,15 +124,16 @@ def _refine(
     for _ in range(100):
         weight = _huber_weights(rows) if robust else None
         normal, gradient = rows.normal_equations(weight)
-        step = -_solve_normal(normal, gradient)
+        covariance = _inverse(normal)
+        step = -covariance @ gradient
         promise = -float(gradient @ step)
         settled = rows.cost / freedom + _rounding(points, state)
         if promise <= tolerance * settled:
-            return state, rows, weight
+            return _Optimum(state, rows, weight, covariance)
         before = state
         state, rows = _descend(points, state, rows, step, weight, weights_of)
         if state is before and promise <= 1e-3 * settled:
-            return state, rows, weight
+            return _Optimum(state, rows, weight, covariance)
     raise NotConverged("the fit of a joint axis did not converge in 100 steps")
 
 
@@ -162,24 +175,21 @@ def _huber_weights(rows: Rows) -> Array:
     return np.minimum(1.0, HUBER_LIMIT * scale / np.maximum(length, 1e-300))
 
 
-def _solve_normal(normal: Array, gradient: Array) -> Array:
-    return _inverse(normal) @ gradient
-
-
 def _inverse(normal: Array) -> Array:
     """Inverse of an information matrix, scaled first; unknowns that no point touches (diagonal 0) stay put."""
-    diagonal = np.diag(normal)
+    diagonal = normal.diagonal()
     touched = diagonal > 0
-    scale = np.where(touched, 1.0 / np.sqrt(np.where(touched, diagonal, 1.0)), 0.0)
-    scaled = normal * scale[:, None] * scale + np.diag(~touched * 1.0)
-    if np.linalg.eigvalsh(scaled)[0] < 1e-14:
+    scale = 1.0 / np.sqrt(np.where(touched, diagonal, 1.0))
+    values, vectors = np.linalg.eigh(normal * scale[:, None] * scale)
+    values = values[np.sum(~touched) :]
+    if values[0] < 1e-14:
         raise AxisUndefined(STRAIGHT)
-    return np.linalg.inv(scaled) * scale[:, None] * scale
+    scaled = vectors[:, -len(values) :] * scale[:, None]
+    return (scaled / values) @ scaled.T
 
 
-def _result(points: SweepPoints, state: RotaryState, rows: Rows, weight: Array | None) -> AxisFit:
-    normal, _ = rows.normal_equations(weight)
-    covariance = _inverse(normal)
+def _result(points: SweepPoints, found: _Optimum) -> AxisFit:
+    state, rows, weight, covariance = found.state, found.rows, found.weight, found.covariance
     freedom = _degrees_of_freedom(points, rows)
     total = _weighted_cost(rows, weight)
     factor = np.sqrt(total / freedom) if freedom > 0 else 1.0
@@ -192,7 +202,7 @@ def _result(points: SweepPoints, state: RotaryState, rows: Rows, weight: Array |
     return AxisFit(
         line=Line(state.point_m + along * state.direction, state.direction),
         sliding=False,
-        basis=np.stack(perpendicular_basis(state.direction)),
+        basis=state.basis[:2],
         covariance=covariance[:4, :4] * scale,
         estimator="likelihood",
         sigma_m=sigma,
@@ -210,9 +220,8 @@ def _result(points: SweepPoints, state: RotaryState, rows: Rows, weight: Array |
 
 
 def _degrees_of_freedom(points: SweepPoints, rows: Rows) -> int:
-    count, components, unknown = rows.matrix.shape
     stops = 0 if points.stop is None else int(points.stop.max()) + 1
-    return count * components - stops - unknown
+    return rows.residual.size - stops - rows.unknowns
 
 
 def _outliers(rows: Rows, covariance: Array, total: float, freedom: int) -> Array:

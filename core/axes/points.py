@@ -32,7 +32,7 @@ class SweepPoints:
     def target_index(self) -> np.ndarray:
         return np.zeros(self.count, dtype=int) if self.target is None else self.target
 
-    def only(self, rows: np.ndarray) -> "SweepPoints":
+    def only(self, rows: np.ndarray | slice) -> "SweepPoints":
         """Some of the points; targets keep their numbers."""
         return SweepPoints(
             self.point_m[rows],

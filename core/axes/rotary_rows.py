@@ -12,6 +12,9 @@ from core.axes.plane_circle import PlaneCircle
 from core.axes.points import SweepPoints
 from core.geometry import Array, cross, perpendicular_basis, rotation_about, wrap_angle
 
+BLOCK = 16_384
+"""Points are worked on in blocks of so many."""
+
 
 @dataclass(frozen=True)
 class RotaryState:
@@ -20,7 +23,8 @@ class RotaryState:
     pivot_m: Array
     """Tilts turn the axis about this point in the middle of the measured ones, so that they stay near their arcs."""
     point_m: Array
-    direction: Array
+    basis: Array
+    """e1, e2 and the direction of the axis, as rows, (3, 3); a tilt carries all three along."""
     height_m: Array
     radius_m: Array
     azimuth_rad: Array | None
@@ -28,13 +32,17 @@ class RotaryState:
     arc_m: Array
     """Length by which angles are turned into arcs: the radius at the start, kept so that derivatives are exact."""
 
+    @property
+    def direction(self) -> Array:
+        return self.basis[2]
+
 
 @dataclass(frozen=True)
 class Rows:
     """Whitened residuals and their derivatives: what one Gauss-Newton step needs."""
 
-    matrix: Array
-    """(k, c, p)."""
+    blocks: tuple[Array, ...]
+    """Derivatives, (k, c, p), cut along k into blocks that stay in the processor's cache."""
     residual: Array
     """(k, c)."""
     raw: Array
@@ -45,10 +53,26 @@ class Rows:
         flat = self.residual.ravel()
         return float(flat @ flat)
 
+    @property
+    def matrix(self) -> Array:
+        """All derivatives in one array, (k, c, p)."""
+        return self.blocks[0] if len(self.blocks) == 1 else np.concatenate(self.blocks)
+
+    @property
+    def unknowns(self) -> int:
+        return self.blocks[0].shape[2]
+
     def normal_equations(self, weight: Array | None) -> tuple[Array, Array]:
-        flat = self.matrix.reshape(-1, self.matrix.shape[2])
-        weighted = flat if weight is None else flat * np.repeat(weight, self.matrix.shape[1])[:, None]
-        return weighted.T @ flat, weighted.T @ self.residual.ravel()
+        """Information matrix (p, p) and gradient (p,) of half the weighted sum of squares; weight: (k,)."""
+        normal, gradient, at = np.zeros((self.unknowns, self.unknowns)), np.zeros(self.unknowns), 0
+        for block in self.blocks:
+            rows = slice(at, at + len(block))
+            at = rows.stop
+            flat = block.reshape(-1, self.unknowns)
+            weighted = flat if weight is None else flat * np.repeat(weight[rows], block.shape[1])[:, None]
+            normal += weighted.T @ flat
+            gradient += weighted.T @ self.residual[rows].ravel()
+        return normal, gradient
 
 
 def state_at(points: SweepPoints, start: PlaneCircle) -> RotaryState:
@@ -56,28 +80,28 @@ def state_at(points: SweepPoints, start: PlaneCircle) -> RotaryState:
     target, counts = points.target_index(), points_of_targets(points)
     along = (points.point_m - start.point_m) @ start.direction
     point = start.point_m + start.direction * along.mean()
-    e1, e2 = perpendicular_basis(start.direction)
-    x, y = (points.point_m - point) @ e1, (points.point_m - point) @ e2
+    basis = np.array([*perpendicular_basis(start.direction), start.direction])
+    x, y = basis[:2] @ (points.point_m - point).T
     height = np.bincount(target, along - along.mean(), points.target_count) / counts
     radius = np.bincount(target, np.hypot(x, y), points.target_count) / counts
     azimuth = None if points.stop is None else _azimuths(points, np.arctan2(y, x))
-    return RotaryState(points.point_m.mean(axis=0), point, start.direction, height, radius, azimuth, radius)
+    return RotaryState(points.point_m.mean(axis=0), point, basis, height, radius, azimuth, radius)
 
 
 def moved(state: RotaryState, step: Array) -> RotaryState:
-    e1, e2 = perpendicular_basis(state.direction)
+    """The state after a step of the unknowns."""
+    e1, e2, _ = state.basis
     k = len(state.height_m)
     turn = step[0] * e2 - step[1] * e1
-    angle = np.sqrt(turn @ turn)
+    angle = float(np.sqrt(turn @ turn))
     rotation = rotation_about(turn / angle, angle) if angle > 0 else np.eye(3)
     azimuth = state.azimuth_rad
     if azimuth is not None:
         azimuth = azimuth + np.concatenate([[0.0], step[4 + 2 * k :]])
-        # The angles are counted in a basis that follows the direction; a tilt leaves them alone to first order.
     return RotaryState(
         state.pivot_m,
         state.pivot_m + rotation @ (state.point_m + step[2] * e1 + step[3] * e2 - state.pivot_m),
-        rotation @ state.direction,
+        state.basis @ rotation.T,
         state.height_m + step[4 : 4 + k],
         state.radius_m + step[4 + k : 4 + 2 * k],
         azimuth,
@@ -86,9 +110,22 @@ def moved(state: RotaryState, step: Array) -> RotaryState:
 
 
 def rows_at(points: SweepPoints, state: RotaryState, weights_of: RotaryState | None) -> Rows:
-    """Residuals and derivatives by (tilt 1, tilt 2, shift 1, shift 2, heights, radii, azimuths)."""
-    e1, e2 = perpendicular_basis(state.direction)
-    basis = np.stack([e1, e2, state.direction])
+    """Residuals and derivatives by (tilt 1, tilt 2, shift 1, shift 2, heights, radii, azimuths).
+
+    Skew noise is resolved along the axis, away from it and along the arc as these are at ``weights_of``.
+    """
+    if points.count <= BLOCK or points.stop is not None:
+        return _block_at(points, state, weights_of)
+    parts = [_block_at(points.only(slice(at, at + BLOCK)), state, weights_of) for at in range(0, points.count, BLOCK)]
+    return Rows(
+        tuple(part.blocks[0] for part in parts),
+        np.concatenate([part.residual for part in parts]),
+        np.concatenate([part.raw for part in parts]),
+    )
+
+
+def _block_at(points: SweepPoints, state: RotaryState, weights_of: RotaryState | None) -> Rows:
+    basis = state.basis
     x, y, z = basis @ (points.point_m - state.point_m).T
     lever_x, lever_y, lever_z = basis @ (state.pivot_m - state.point_m)
     rho = np.maximum(np.hypot(x, y), 1e-300)
@@ -180,7 +217,7 @@ def _whitened(points: SweepPoints, matrix: Array, raw: Array, local: Array | Non
         arc = _along_arc(state.arc_m[points.target_index()]) if components == 3 else None
     if arc is not None:
         matrix, residual = _without_stop_angles(points.stop, arc, matrix, residual)
-    return Rows(matrix, residual, raw)
+    return Rows((matrix,), residual, raw)
 
 
 def _along_arc(length: Array) -> Array:
