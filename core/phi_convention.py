@@ -39,6 +39,8 @@ class Convention:
     """Index (0..) of the axis that carries the origin."""
     normal_joint: int | None
     """Index of the axis whose common normal fixes the origin's height; None: the foot of a given point."""
+    height_joint: int
+    """Index of the turning axis whose point fixes the origin's height where no common normal does."""
     heading_joint: int
     """Index of the axis that gives Y_1 its heading."""
     heading_is_offset: bool
@@ -47,8 +49,8 @@ class Convention:
     """The sign of the cross product, as the nominal base frame has it."""
 
     @property
-    def height_is_free(self) -> bool:
-        """Whether the origin's height on its axis follows from axis 2 exactly as in section 4."""
+    def is_of_section_4(self) -> bool:
+        """Whether axes 1 and 2 alone fix the base frame, by their common normal, as in section 4."""
         return self.origin_joint == 0 and self.normal_joint == 1 and not self.heading_is_offset
 
     @property
@@ -101,6 +103,7 @@ def convention_for(
         sliding=np.asarray(sliding, dtype=bool),
         origin_joint=origin,
         normal_joint=_first_not_parallel(lines, sliding, origin),
+        height_joint=_next_turning(sliding, origin),
         heading_joint=heading,
         heading_is_offset=offset,
         heading_sign=sign,
@@ -117,12 +120,14 @@ def base_frame(lines: tuple[Line, ...], convention: Convention) -> Array:
     if convention.normal_joint is not None:
         origin, _ = common_normal(carrier, lines[convention.normal_joint])
     else:
-        origin = carrier.foot_of(lines[convention.heading_joint].point_m)
+        origin = carrier.foot_of(lines[convention.height_joint].point_m)
+    heading = lines[convention.heading_joint]
     if convention.heading_is_offset:
-        y = lines[convention.heading_joint].point_m - origin
-        y = y - z * (z @ y)
+        # To where that axis passes through the plane of the base, so that Z_phi meets it and b is zero.
+        along = (origin - heading.point_m) @ z / (heading.direction @ z)
+        y = heading.point_m + along * heading.direction - origin
     else:
-        y = convention.heading_sign * cross(z, lines[convention.heading_joint].direction)
+        y = convention.heading_sign * cross(z, heading.direction)
     y = y / np.linalg.norm(y)
     return transform(np.stack([cross(y, z), y, z], axis=1), origin)
 
@@ -149,6 +154,12 @@ def _first_not_parallel(lines: tuple[Line, ...], sliding: np.ndarray, origin: in
         if crossing and not sliding[k]:
             return k
     return None
+
+
+def _next_turning(sliding: np.ndarray, origin: int) -> int:
+    """The next turning joint after the one that carries the origin, or that one itself."""
+    later = np.flatnonzero(~np.asarray(sliding)[origin + 1 :])
+    return origin + 1 + int(later[0]) if len(later) else origin
 
 
 def _choose_phi(lines: tuple[Line, ...], rule: Convention) -> Convention:

@@ -1,15 +1,17 @@
 """From the uncertainty of joint axes to that of phi-model parameters.
 
-Axes at rest are a smooth one-to-one function of the base frame (6 numbers less what the convention leaves to agreement)
-and of the free parameters of every frame. Its Jacobian follows from the twist by which each parameter moves all axes
-beyond it; the inverse carries the covariance of the axes over to the parameters, exactly to first order.
+Each parameter moves all axes beyond its frame by a known twist, and the base frame moves all axes together. By the rule
+of section 4 the base frame has six freedoms of its own, two parameters of frame 1 are fixed, and axes are a one-to-one
+function of both: the inverse of its Jacobian carries the covariance of the axes over to the parameters, exactly to
+first order. Where the rule had to be completed (``phi_convention.py``) the base frame follows from the axes by that
+rule, its motion is taken off those of the axes, and the parameters follow from what is left.
 """
 
 import numpy as np
 
 from core.estimate import Geometry, axis_basis
 from core.geometry import Array, Line, cross
-from core.phi_convention import Convention
+from core.phi_convention import Convention, base_frame
 from core.phi_model import PhiModel, from_axes, near, parameter_twists
 
 
@@ -30,14 +32,24 @@ def geometry_from_axes(
     base, model = from_axes(lines, convention)
     model = near(model, nominal)
     free = convention.free.ravel()
-    rows = _measured_rows(convention.sliding)
-    by_parameters = axes_by_parameters(lines, base, model)[rows][:, free]
-    by_base = _axes_by_twists(lines, _base_twists(base, lines, convention), 0)[rows]
-    jacobian = np.concatenate([by_base, by_parameters], axis=1)
-    inverse = np.linalg.pinv(jacobian, rcond=1e-12)[by_base.shape[1] :]
-    covariance = np.zeros((len(free), len(free)))
-    covariance[np.ix_(free, free)] = inverse @ axis_covariance[np.ix_(rows, rows)] @ inverse.T
+    by_axes = np.zeros((len(free), axis_covariance.shape[0]))
+    by_axes[free] = _parameters_by_axes(lines, base, model, convention)
+    # A sliding axis has no place: its shifts are not known, and change nothing.
+    covariance = by_axes @ np.where(np.isnan(axis_covariance), 0.0, axis_covariance) @ by_axes.T
     return Geometry(base, model, np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(-1, 4), covariance)
+
+
+def _parameters_by_axes(lines: tuple[Line, ...], base: Array, model: PhiModel, convention: Convention) -> Array:
+    """Derivatives of the free parameters by tilts and shifts of all axes, (free, 4n)."""
+    free, measured = convention.free.ravel(), _measured_rows(convention.sliding)
+    by_parameters = axes_by_parameters(lines, base, model)[measured][:, free]
+    by_base = _axes_by_twists(lines, np.eye(6), 0)[measured]
+    out = np.zeros((int(free.sum()), 4 * len(lines)))
+    if convention.is_of_section_4:
+        out[:, measured] = np.linalg.pinv(np.hstack([by_base, by_parameters]), rcond=1e-12)[6:]
+        return out
+    left = np.eye(4 * len(lines))[measured] - by_base @ _base_by_axes(lines, base, convention)
+    return np.linalg.pinv(by_parameters, rcond=1e-12) @ left
 
 
 def axes_by_parameters(lines: tuple[Line, ...], base: Array, model: PhiModel) -> Array:
@@ -64,20 +76,26 @@ def _measured_rows(sliding: np.ndarray) -> np.ndarray:
     return np.flatnonzero(measured.ravel())
 
 
-def _base_twists(base: Array, lines: tuple[Line, ...], convention: Convention) -> Array:
-    """The ways in which axes can move the base frame: three turns and three shifts, less what is agreed."""
-    x, y, z, origin = base[:3, :4].T
-    turns = [(axis, cross(origin, axis)) for axis in (x, y, z)]
-    if _heading_is_agreed(convention):
-        turns = turns[:2]
-    shifts = [(np.zeros(3), axis) for axis in (x, y, z)]
-    if not convention.height_is_free:
-        along = lines[convention.origin_joint].direction
-        others = axis_basis(along)
-        shifts = [(np.zeros(3), axis) for axis in others]
-    return np.array([np.concatenate(twist) for twist in (*turns, *shifts)])
+def _base_by_axes(lines: tuple[Line, ...], base: Array, convention: Convention) -> Array:
+    """Twist of the base frame by tilts and shifts of all axes, (6, 4n), by central differences of its rule."""
+    out = np.zeros((6, 4 * len(lines)))
+    step = 1e-6
+    for k, line in enumerate(lines):
+        for column, (tilt, shift) in enumerate(_unit_moves(line)):
+            ends = []
+            for sign in (step, -step):
+                moved = Line(line.point_m + sign * shift, line.direction + sign * tilt)
+                ends.append(base_frame((*lines[:k], moved, *lines[k + 1 :]), convention))
+            change = (ends[0] - ends[1]) / (2 * step)
+            spin = change[:3, :3] @ base[:3, :3].T
+            turn = np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2
+            out[:3, 4 * k + column] = turn
+            out[3:, 4 * k + column] = change[:3, 3] - cross(turn, base[:3, 3])
+    return out
 
 
-def _heading_is_agreed(convention: Convention) -> bool:
-    """Where an axis beyond the second gives Y_1 its heading, both angles of frame 1 are free and the heading is not."""
-    return convention.heading_joint != 1
+def _unit_moves(line: Line) -> list[tuple[Array, Array]]:
+    """Changes of direction and point for unit tilts and shifts of an axis."""
+    e1, e2 = axis_basis(line.direction)
+    still = np.zeros(3)
+    return [(e1, still), (e2, still), (still, e1), (still, e2)]

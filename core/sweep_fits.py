@@ -77,7 +77,8 @@ def fit_sweeps(campaign: Campaign, estimator: str = "likelihood", reject: bool =
 
 def _first_noise(sweeps: list[Sweep]) -> Noise:
     stated = all(is_stated(sweep.covariance_m2) for sweep in sweeps)
-    return Noise(stated, added_m=0.0 if stated else 1.0)
+    # Where nothing is stated any small number will do: the fits show what it should have been.
+    return Noise(stated, added_m=0.0 if stated else 1e-9)
 
 
 def _require_one_motor(campaign: Campaign, sweep: Sweep) -> None:

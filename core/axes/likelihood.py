@@ -35,6 +35,8 @@ SUBSET = 4000
 STRAIGHT = "the points cannot be told from a straight line; expected a longer arc or less noise"
 FLAT_ARC = 10.0
 """Where the sagitta stands out of the scatter across the plane by less, both starts are tried."""
+LARGEST_TILT_RAD = 0.3
+"""Standard uncertainty of the direction beyond which no axis is claimed."""
 SHORT_ARC = 0.2
 """... on arcs whose sagitta is less than this share of their chord."""
 MEASURED_RADIUS = 3.0
@@ -252,4 +254,10 @@ def _require_arc(points: SweepPoints, state: RotaryState, covariance: Array, fac
         raise AxisUndefined(
             f"the points cannot be told from a straight line: the arc's radius is {largest * 1e3:.4g} mm "
             f"+- {radius_std.min() * 1e3:.2g} mm; expected a longer arc or less noise"
+        )
+    tilt_std = factor * float(np.sqrt(covariance[0, 0] + covariance[1, 1]))
+    if tilt_std > LARGEST_TILT_RAD:
+        raise AxisUndefined(
+            f"the direction of the axis would be known to {np.rad2deg(tilt_std):.0f} deg only; "
+            "expected a longer arc or less noise"
         )

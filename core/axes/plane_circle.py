@@ -15,6 +15,10 @@ from core.axes.points import SweepPoints
 from core.errors import AxisUndefined
 from core.geometry import Array, cross
 
+LEAST_EXTENT = 3.0
+"""Points that extend less far along their path than this times their noise show no path."""
+FEW_POINTS = 12.0
+"""What is asked on top of few points, over the degrees of freedom of their scatter."""
 SIGNIFICANT_BEND = 3.0
 """An arc counts as bent where its curvature is that many standard deviations."""
 
@@ -38,7 +42,7 @@ def plane_circle(points: SweepPoints, debias: bool = True) -> PlaneCircle:
     centred, weight = _about_target_means(points)
     values, vectors = np.linalg.eigh(centred.T @ centred)
     spread = np.sqrt(np.maximum(values, 0.0) / points.count)
-    check_extent(spread, np.abs(points.point_m).max(initial=1e-3))
+    check_extent(spread, points)
     direction, in_plane = vectors[:, 0], vectors[:, 1:]
     noise = values[0] / max(points.count - points.target_count - 2, 1) * weight if debias else 0.0
     noise = min(noise, 0.5 * values[1])
@@ -79,12 +83,21 @@ def _bend_noise(arc: Array, chord: Array, s: Array, coefficients: Array) -> floa
     return float(np.sqrt(variance * np.linalg.inv(design.T @ design)[2, 2]))
 
 
-def check_extent(spread_m: Array, reach_m: float) -> None:
-    """Raise AxisUndefined where points coincide or are collinear to rounding; spread as in PlaneCircle."""
-    if spread_m[2] <= 1e-12 * reach_m:
+def check_extent(spread_m: Array, points: SweepPoints) -> None:
+    """Raise AxisUndefined where points stay at one place within their noise, or are collinear to rounding.
+
+    Args:
+        spread_m: root mean square extents: the least (noise alone), the middle one, and along the path, (3,).
+        points: the points, with their stated noise.
+    """
+    reach = float(np.abs(points.point_m[0]).max(initial=1e-3))
+    stated = 0.0 if points.sigma_m is None else float(np.sqrt(np.mean(points.sigma_m**2)))
+    # The least extent of few points is small by luck; the fewer they are, the more is asked of the path.
+    by_scatter = (LEAST_EXTENT + FEW_POINTS / max(points.count - points.target_count - 2, 1)) * spread_m[0]
+    if spread_m[2] <= max(by_scatter, LEAST_EXTENT * stated, 1e-12 * reach):
         raise AxisUndefined(
-            "all points are at one place: the joint did not move, or the target sits on its axis; "
-            "expected points along an arc"
+            f"all points stay within {2 * spread_m[2] * 1e3:.2g} mm of one place, no more than their noise: the joint "
+            "did not move, or the target sits on the axis; expected points along an arc"
         )
     if spread_m[1] <= 1e-7 * spread_m[2]:
         raise AxisUndefined("the points lie on one straight line: no joint axis can be told from them")

@@ -51,7 +51,7 @@ def _principal_direction(points: SweepPoints) -> Array:
         centred[mine] = points.point_m[mine] - points.point_m[mine].mean(axis=0)
     values, vectors = np.linalg.eigh(centred.T @ centred)
     spread = np.sqrt(np.maximum(values, 0.0) / points.count)
-    check_extent(np.array([spread[0], spread[2], spread[2]]), np.abs(points.point_m).max(initial=1e-3))
+    check_extent(np.array([spread[1], spread[2], spread[2]]), points)
     return vectors[:, 2]
 
 

@@ -158,10 +158,9 @@ class TestUndefined:
 
     @pytest.mark.parametrize("sliding", [False, True])
     def test_all_points_at_one_place(self, sliding):
-        with pytest.raises(AxisUndefined, match="all points are at one place: the joint did not move"):
+        with pytest.raises(AxisUndefined, match="of one place, no more than their noise: the joint did not move"):
             fit_axis(np.tile([1.0, 2.0, 3.0], (8, 1)), sliding=sliding)
 
-    @pytest.mark.xfail(reason="noise alone is taken for motion, or does not converge")
     @pytest.mark.parametrize("count", [6, 20, 100, 400])
     @pytest.mark.parametrize("sliding", [False, True])
     def test_all_points_at_one_place_but_for_noise(self, sliding, count):
@@ -173,7 +172,7 @@ class TestUndefined:
     @pytest.mark.parametrize("seed", range(5))
     def test_a_target_on_the_axis(self, seed):
         points = noisy(ring(np.linspace(0, 6, 40), radius=0.5 * SIGMA), seed)
-        with pytest.raises(AxisUndefined, match="the target sits on the axis: it stays within"):
+        with pytest.raises(AxisUndefined, match="sits on the axis"):
             fit_axis(points, sigma_m=SIGMA)
 
     @pytest.mark.parametrize("seed", range(5))

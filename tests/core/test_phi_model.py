@@ -173,7 +173,7 @@ class TestConvention:
         model = random_model(np.random.default_rng(1), (False,) * 6)
         convention = convention_of(model)
         assert (convention.origin_joint, convention.normal_joint, convention.heading_joint) == (0, 1, 1)
-        assert convention.height_is_free
+        assert convention.is_of_section_4
         assert not convention.heading_is_offset
 
     def test_parallel_first_axes_take_their_heading_from_each_other(self):
