@@ -1,0 +1,133 @@
+"""A campaign folder -> the events that a session would have kept of it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from core.campaign_files import read_campaign
+from core.errors import CampaignError, RobotError
+from core.geometry import Array
+from core.input_files import read_text
+from core.kinematics import active_commands
+from core.measurements import SWEEP, Campaign
+from core.robot_files import ROBOT_FORMAT
+from core.session_events import (
+    Event,
+    Fact,
+    InstrumentChosen,
+    OperatorNamed,
+    Planned,
+    RobotChosen,
+    ShotTaken,
+    TargetEntry,
+    TargetsNamed,
+    Titled,
+)
+from core.session_plan import PlannedSweep
+from core.toml_records import LIMIT_BYTES, parse_toml
+from core.urdf import URDF_LIMIT_BYTES
+
+OPERATOR = "operator"
+"""The note of a campaign that names who measured."""
+UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+OPTIONAL = (
+    "time_s",
+    "temperature_c",
+    "arm_temperature_c",
+    "payload_kg",
+    "speed",
+    "torque_nm",
+    "readback",
+    "target_quaternion",
+    "simulated_point_m",
+)
+"""Columns of a campaign that a shot may carry, under the same names."""
+
+
+def campaign_events(folder: Path | str) -> list[Event]:
+    """What happened in a campaign, as events.
+
+    Raises:
+        CampaignError, RobotError: the folder cannot be read.
+    """
+    campaign = read_campaign(folder)
+    instrument, notes = campaign.instrument, dict(campaign.notes)
+    events: list[Event] = [
+        Titled(campaign.title),
+        OperatorNamed(notes.pop(OPERATOR, "")),
+        _robot_event(Path(folder)),
+        TargetsNamed(tuple(TargetEntry(t.name, t.link, t.point_m, t.sigma_m) for t in campaign.targets)),
+        InstrumentChosen(instrument.kind, instrument.sigma_m, instrument.description),
+        Planned(sweeps_of(campaign), None if campaign.home is None else campaign.home, campaign.joint_values),
+    ]
+    events += [Fact(key[:200], value[:200]) for key, value in notes.items()]
+    return events + shots_of(campaign)
+
+
+def sweeps_of(campaign: Campaign) -> tuple[PlannedSweep, ...]:
+    """The sweeps that a campaign made, as a plan; those of a single stop are left to the shots."""
+    table, robot = campaign.measurements, campaign.robot
+    home = np.zeros(robot.joint_count) if campaign.home is None else campaign.home
+    motors = active_commands(robot, table.commanded) - active_commands(robot, home)
+    swept = np.flatnonzero(table.phase == SWEEP)
+    sweeps = []
+    for joint, number in dict.fromkeys(zip(table.joint[swept].tolist(), table.sweep[swept].tolist(), strict=True)):
+        rows = swept[(table.joint[swept] == joint) & (table.sweep[swept] == number)]
+        along = motors[rows, joint - 1]
+        low, high, stops = float(along.min()), float(along.max()), int(table.step[rows].max()) + 1
+        if low < high and stops > 1:
+            names = tuple(dict.fromkeys(campaign.targets[k].name for k in table.target[rows]))
+            both_ways = len(set(table.approach[rows, joint - 1].tolist()) - {0}) > 1
+            sweeps.append(PlannedSweep(joint, number, low, high, stops, names, both_ways))
+    return tuple(sweeps)
+
+
+def shots_of(campaign: Campaign) -> list[ShotTaken]:
+    """Every row of a campaign as a shot; covariances that only repeat the instrument's sigma are left out."""
+    table = campaign.measurements
+    names = [*(target.name for target in campaign.targets), ""]
+    stated = campaign.instrument.sigma_m
+    upper = np.array([table.covariance_m2[:, i, j] for i, j in UPPER]).T
+    own = np.isfinite(upper).all(axis=1)
+    if stated is not None:
+        own &= ~np.isclose(table.covariance_m2, stated**2 * np.eye(3), rtol=1e-13, atol=0).all(axis=(1, 2))
+    seen = table.seen
+    return [
+        ShotTaken(
+            target=names[table.target[k]],
+            commanded=table.commanded[k],
+            point_m=table.point_m[k] if seen[k] else None,
+            covariance_m2=upper[k] if own[k] else None,
+            phase=str(table.phase[k]),
+            joint=int(table.joint[k]),
+            sweep=int(table.sweep[k]),
+            step=int(table.step[k]),
+            pose=int(table.pose[k]),
+            approach=table.approach[k] if table.approach[k].any() else (),
+            check=bool(table.check[k]),
+            record=int(table.record[k]),
+            **{name: _one(getattr(table, name), k) for name in OPTIONAL},
+        )
+        for k in range(table.count)
+    ]
+
+
+def _one(column: Array | None, row: int) -> Any:
+    if column is None or not np.isfinite(column[row]).all():
+        return None
+    return column[row]
+
+
+def _robot_event(folder: Path) -> RobotChosen:
+    """The texts of the robot of a campaign folder that has been read before."""
+    top = parse_toml(
+        read_text(folder / "campaign.toml", LIMIT_BYTES, CampaignError), "trueaxis-campaign/1", CampaignError
+    )
+    path = folder / top.text("robot", "robot.toml")
+    source = read_text(path, LIMIT_BYTES, RobotError)
+    robot = parse_toml(source, ROBOT_FORMAT, RobotError)
+    if "urdf" not in robot:
+        return RobotChosen(source.text)
+    name = robot.text("urdf")
+    return RobotChosen(source.text, {name: read_text(path.parent / name, URDF_LIMIT_BYTES, RobotError).text})
