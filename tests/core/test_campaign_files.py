@@ -1,6 +1,5 @@
 """Campaign folders: what is read, in which units; what is refused, and what the message names; the way back."""
 
-import os
 import time
 import tomllib
 from hashlib import sha256
@@ -28,8 +27,8 @@ from core.campaign_writer import write_campaign
 from core.errors import CampaignError, InputError
 from core.measurements import Campaign
 
-REAL = Path(os.environ.get("TRUEAXIS_UR10_CAMPAIGN", "no such folder"))
-"""The published UR10 campaign of 11,911 poses, where it is at hand."""
+REAL = Path(__file__).resolve().parents[3] / "shared" / "real" / "ur10_a"
+"""The published UR10 campaign of 11,911 poses, beside the checkout where it is at hand."""
 
 MM = 1e-3
 
@@ -372,7 +371,7 @@ def test_twenty_thousand_rows_are_read_at_once(tmp_path: Path) -> None:
     assert campaign.measurements.count == 20_000
 
 
-@pytest.mark.skipif(not REAL.is_dir(), reason="TRUEAXIS_UR10_CAMPAIGN names no folder")
+@pytest.mark.skipif(not REAL.is_dir(), reason="the measured campaign is not at hand")
 def test_a_measured_campaign_is_read() -> None:
     start = time.process_time()
     campaign = read_campaign(REAL)
