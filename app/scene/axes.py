@@ -1,0 +1,185 @@
+"""Joint axes as long thin arrows with labels, and how well they are known as a tube about them."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from app.scene.colours import FITTED_AXIS, HIGHLIGHT, NOMINAL_AXIS, Rgb
+from app.scene.poses import link_motions, pose_of, together
+from app.scene.solids import Solid, arrow, lathe
+from core.geometry import Array, Line
+
+if TYPE_CHECKING:
+    import viser
+
+TUBE_OPACITY = 0.28
+
+
+@dataclass(frozen=True)
+class AxisMark:
+    """An axis at rest as it is to be drawn."""
+
+    joint: int
+    """1..n"""
+    line: Line
+    """At zero displacement, in the instrument's frame."""
+    middle_m: Array
+    """The point of the axis about which the arrow lies, (3,): where the joint is."""
+    direction_std_rad: float = float("nan")
+    """Standard uncertainty of the direction; NaN: no tube."""
+    point_std_m: float = float("nan")
+    """Standard uncertainty of the place at ``line.point_m``; NaN (a slide has no place): taken as 0."""
+    text: str = ""
+    """Of the label; empty: none."""
+
+
+def axis_arrow(mark: AxisMark, length_m: float, radius_m: float) -> Solid:
+    """The arrow of an axis: a third of it behind the joint, two thirds ahead."""
+    start, end = axis_ends(mark, length_m)
+    return arrow(start, end, radius_m)
+
+
+def axis_ends(mark: AxisMark, length_m: float) -> tuple[Array, Array]:
+    """Tail and tip of the arrow of an axis, each (3,)."""
+    middle = mark.line.foot_of(mark.middle_m)
+    return middle - length_m / 3 * mark.line.direction, middle + 2 * length_m / 3 * mark.line.direction
+
+
+def tube_radius_m(mark: AxisMark, along_m: ArrayLike, exaggeration: float) -> Array:
+    """Radius of the tube at distances from the axis' point, (k,): one standard uncertainty, exaggerated.
+
+    Place and direction are uncorrelated at that point, so variances add: narrow there, wider to both ends.
+    """
+    place = 0.0 if np.isnan(mark.point_std_m) else mark.point_std_m
+    return exaggeration * np.hypot(place, np.asarray(along_m, dtype=float) * mark.direction_std_rad)
+
+
+def uncertainty_tube(mark: AxisMark, length_m: float, exaggeration: float, least_m: float = 1e-4) -> Solid | None:
+    """The tube about the arrow of an axis; None where the uncertainty is not known."""
+    if not np.isfinite(mark.direction_std_rad):
+        return None
+    start, end = axis_ends(mark, length_m)
+    ways = np.linspace((start - mark.line.point_m) @ mark.line.direction, 0.0, 8)
+    ways = np.union1d(ways, np.linspace((end - mark.line.point_m) @ mark.line.direction, 0.0, 8))
+    low, high = ((p - mark.line.point_m) @ mark.line.direction for p in (start, end))
+    ways = ways[(ways >= low - 1e-12) & (ways <= high + 1e-12)]
+    radius = np.maximum(tube_radius_m(mark, ways, exaggeration), least_m)
+    return lathe(mark.line.point_m, mark.line.direction, np.stack([ways, radius], axis=1), 16)
+
+
+class AxesView:
+    """Axes of one arm that follow its motion: nodes ``root/1`` .. ``root/n`` with ``arrow``, ``tube``, ``label``."""
+
+    def __init__(
+        self,
+        scene: "viser.SceneApi",
+        root: str,
+        marks: tuple[AxisMark, ...],
+        sliding: np.ndarray,
+        length_m: float,
+        colour: Rgb = FITTED_AXIS,
+        radius_m: float = 0.004,
+        exaggeration: float = 1.0,
+    ) -> None:
+        """Draw the axes of joints 1..n, in that order, as they are with all joints at zero."""
+        self._scene, self._root, self._colour = scene, root, colour
+        self._length, self._radius, self._exaggeration = length_m, radius_m, exaggeration
+        self._marks, self._sliding = tuple(marks), np.asarray(sliding, dtype=bool)
+        self._lit: int | None = None
+        self._top = scene.add_frame(root, show_axes=False)
+        self._nodes = [self._node(mark) for mark in marks]
+        self._shafts = [self._arrow(mark, colour, radius_m) for mark in marks]
+        self._labels = [self._label(mark) for mark in marks if mark.text]
+        self._tubes: list[viser.MeshHandle] = []
+        self._draw_tubes()
+
+    def show(self, net: ArrayLike) -> None:
+        """Move the axes to where joints at net displacements (n,) bring them."""
+        motions = link_motions(tuple(m.line for m in self._marks), self._sliding, net)
+        with together(self._scene):
+            for node, mark, motion in zip(self._nodes, self._marks, motions[:-1], strict=True):
+                pose = pose_of(motion, mark.middle_m)
+                node.position, node.wxyz = pose.position_m, pose.wxyz
+
+    def highlight(self, joint: int | None) -> None:
+        """Draw one axis, 1..n, thick and in the colour of attention, and the others as usual; None: none."""
+        with together(self._scene):
+            for old in {self._lit, joint} - {None}:
+                lit = old == joint
+                colour, radius = (HIGHLIGHT, 2.0 * self._radius) if lit else (self._colour, self._radius)
+                self._shafts[old - 1] = self._arrow(self._marks[old - 1], colour, radius)
+        self._lit = joint
+
+    @property
+    def exaggeration(self) -> float:
+        """How many times too wide the tubes of uncertainty are drawn."""
+        return self._exaggeration
+
+    @exaggeration.setter
+    def exaggeration(self, factor: float) -> None:
+        self._exaggeration = factor
+        with together(self._scene):
+            self._draw_tubes()
+
+    @property
+    def visible(self) -> bool:
+        return self._top.visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        self._top.visible = visible
+
+    @property
+    def labels_visible(self) -> bool:
+        return all(label.visible for label in self._labels)
+
+    @labels_visible.setter
+    def labels_visible(self, visible: bool) -> None:
+        for label in self._labels:
+            label.visible = visible
+
+    def remove(self) -> None:
+        """Take the axes out of the scene."""
+        self._top.remove()
+
+    def _node(self, mark: AxisMark) -> "viser.FrameHandle":
+        return self._scene.add_frame(f"{self._root}/{mark.joint}", show_axes=False, position=mark.middle_m)
+
+    def _arrow(self, mark: AxisMark, colour: Rgb, radius_m: float) -> "viser.MeshHandle":
+        solid = axis_arrow(mark, self._length, radius_m).about(mark.middle_m)
+        return self._mesh(mark, "arrow", solid, colour, None)
+
+    def _label(self, mark: AxisMark) -> "viser.LabelHandle":
+        tip = axis_ends(mark, self._length)[1] - mark.middle_m
+        name = f"{self._root}/{mark.joint}/label"
+        return self._scene.add_label(name, mark.text, position=tip, anchor="bottom-center", font_screen_scale=1.05)
+
+    def _draw_tubes(self) -> None:
+        solids = [(mark, uncertainty_tube(mark, self._length, self._exaggeration)) for mark in self._marks]
+        self._tubes = [
+            self._mesh(mark, "tube", solid.about(mark.middle_m), self._colour, TUBE_OPACITY)
+            for mark, solid in solids
+            if solid is not None
+        ]
+
+    def _mesh(self, mark: AxisMark, part: str, solid: Solid, colour: Rgb, opacity: float | None) -> "viser.MeshHandle":
+        return self._scene.add_mesh_simple(
+            f"{self._root}/{mark.joint}/{part}",
+            solid.vertices_m,
+            solid.faces,
+            color=colour,
+            opacity=opacity,
+            side="double" if opacity else "front",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+
+def nominal_axes(
+    scene: "viser.SceneApi", root: str, lines: tuple[Line, ...], hubs_m: Array, sliding: np.ndarray, length_m: float
+) -> AxesView:
+    """Nominal axes: thin, grey, without labels and tubes."""
+    marks = tuple(AxisMark(k + 1, line, hub) for k, (line, hub) in enumerate(zip(lines, hubs_m, strict=True)))
+    return AxesView(scene, root, marks, sliding, length_m, NOMINAL_AXIS, 0.0025)

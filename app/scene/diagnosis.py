@@ -1,0 +1,183 @@
+"""The drawing of geometric errors: both arms' axes, phi-frames and common normals, and every difference in place."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from app.scene.cameras import Camera, near
+from app.scene.colours import FITTED_AXIS, GREY, HIGHLIGHT, NOMINAL_AXIS, VERMILLION, Rgb
+from app.scene.dimensions import Dimension, FrameSketch, dimensions, sketches
+from app.scene.error_vectors import factor_text
+from app.scene.poses import together
+from app.scene.solids import Solid, arrow, ball, merged
+from core.estimate import Geometry
+from core.geometry import Array
+from core.phi_model import PhiModel
+
+if TYPE_CHECKING:
+    import viser
+
+
+class DiagnosisView:
+    """Nodes ``root/nominal``, ``root/actual``, ``root/phi_frames``, ``root/dimensions/F_P`` and ``root/factor``.
+
+    ``root/dimensions/2_a_m`` is the dimension of parameter a of frame 2, with its label beside it.
+    """
+
+    def __init__(
+        self,
+        scene: "viser.SceneApi",
+        nominal: PhiModel,
+        geometry: Geometry,
+        base: Array,
+        reach_m: float,
+        exaggeration: float,
+        root: str = "/diagnosis",
+    ) -> None:
+        """Draw all differences; arguments as for ``dimensions``, ``reach_m`` sets the sizes."""
+        self._scene, self._root, self._reach = scene, root, reach_m
+        self._models = (nominal, geometry, base)
+        self._exaggeration = exaggeration
+        self._lit: tuple[int, str] | None = None
+        self._top = scene.add_frame(root, show_axes=False)
+        self.dimensions: tuple[Dimension, ...] = ()
+        self._labels: dict[tuple[int, str], viser.LabelHandle] = {}
+        self._draw()
+
+    @property
+    def exaggeration(self) -> float:
+        """How many times too large differences are drawn."""
+        return self._exaggeration
+
+    @exaggeration.setter
+    def exaggeration(self, factor: float) -> None:
+        self._exaggeration = factor
+        self._draw()
+
+    @property
+    def visible(self) -> bool:
+        return self._top.visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        self._top.visible = visible
+
+    def highlight(self, frame: int | None, parameter: str = "") -> None:
+        """Draw one dimension in the colour of attention, with its label; None: none."""
+        self._lit = None if frame is None else (frame, parameter)
+        with together(self._scene):
+            self._draw_dimensions()
+
+    def camera(self, frame: int, parameter: str, direction: Array) -> Camera:
+        """A close view of one dimension from a direction.
+
+        Raises:
+            KeyError: there is no such dimension.
+        """
+        for d in self.dimensions:
+            if (d.frame, d.parameter) == (frame, parameter):
+                size = max(0.22 * self._reach, 1.4 * float(np.linalg.norm(d.to_m - d.from_m)))
+                return near(d.text, d.middle_m, direction, size)
+        raise KeyError(f"frame {frame} has no dimension {parameter}")
+
+    def remove(self) -> None:
+        """Take the drawing out of the scene."""
+        self._top.remove()
+
+    def _draw(self) -> None:
+        drawn = sketches(*self._models, self._exaggeration)
+        self.dimensions = tuple(dimensions(*self._models, self._exaggeration, 0.2 * self._reach))
+        with together(self._scene):
+            self._sketch("nominal", drawn, NOMINAL_AXIS)
+            self._sketch("actual", drawn, FITTED_AXIS)
+            self._phi_frames(drawn)
+            self._draw_dimensions()
+            top = max(p.to_m[2] for p in self.dimensions) if self.dimensions else self._models[2][2, 3]
+            middle = np.mean([s.phi_frame[:3, 3] for s in drawn], axis=0)
+            place = (middle[0], middle[1], top + 0.3 * self._reach)
+            text = f"differences {factor_text(self._exaggeration)}"
+            self._scene.add_label(f"{self._root}/factor", text, position=place, anchor="bottom-center")
+
+    def _sketch(self, which: str, drawn: list[FrameSketch], colour: Rgb) -> None:
+        half, r = 0.2 * self._reach, 0.0022 * self._reach
+        lines, shafts = [], []
+        for sketch in drawn:
+            axis = sketch.nominal_axis if which == "nominal" else sketch.actual_axis
+            way = sketch.nominal_way_m if which == "nominal" else sketch.actual_way_m
+            lines += [way[:2], way[1:]]
+            radius = r if which == "nominal" else 1.6 * r
+            shafts.append(arrow(axis.point_m - half * axis.direction, axis.point_m + half * axis.direction, radius))
+        self._mesh(f"{which}/axes", merged(shafts), colour)
+        self._scene.add_line_segments(
+            f"{self._root}/{which}/normals", np.array(lines), colour, thickness=2.0, thickness_units="screen"
+        )
+
+    def _phi_frames(self, drawn: list[FrameSketch]) -> None:
+        turns = Rotation.from_matrix([s.phi_frame[:3, :3] for s in drawn]).as_quat(scalar_first=True)
+        self._scene.add_batched_axes(
+            f"{self._root}/phi_frames",
+            turns,
+            np.array([s.phi_frame[:3, 3] for s in drawn]),
+            axes_length=0.06 * self._reach,
+            axes_radius=0.0025 * self._reach,
+        )
+
+    def _draw_dimensions(self) -> None:
+        places = label_places(self.dimensions, 0.075 * self._reach, 0.45 * self._reach)
+        leaders = []
+        for d, place in zip(self.dimensions, places, strict=True):
+            key = (d.frame, d.parameter)
+            lit = key == self._lit
+            name = f"dimensions/{d.frame}_{d.parameter}"
+            self._mesh(name, self._leg(d, lit), HIGHLIGHT if lit else VERMILLION if d.significant else GREY)
+            shown = lit or (d.significant and self._lit is None)
+            self._labels[key] = self._label(f"{name}/label", d.text, place, shown)
+            leaders += [[d.middle_m, place]] if shown else []
+        ends = np.array(leaders) if leaders else np.zeros((1, 2, 3))
+        self._scene.add_line_segments(
+            f"{self._root}/leaders", ends, GREY, thickness=1.0, thickness_units="screen", visible=bool(leaders)
+        )
+
+    def _leg(self, dimension: Dimension, lit: bool) -> Solid:
+        radius = (0.0055 if lit else 0.0035) * self._reach
+        leg = arrow(dimension.from_m, dimension.to_m, radius)
+        return merged([leg, ball(dimension.from_m, radius, 8)])
+
+    def _label(self, name: str, text: str, place: Array, shown: bool) -> "viser.LabelHandle":
+        full = f"{self._root}/{name}"
+        return self._scene.add_label(full, text, position=place, anchor="center-center", visible=shown)
+
+    def _mesh(self, name: str, solid: Solid, colour: Rgb) -> None:
+        self._scene.add_mesh_simple(
+            f"{self._root}/{name}",
+            solid.vertices_m,
+            solid.faces,
+            color=colour,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+
+def label_places(drawn: tuple[Dimension, ...], height_m: float, width_m: float) -> Array:
+    """Places for labels near their dimensions, (k, 3), one above the other where they would overlap.
+
+    Arms are looked at from the side, so labels that are ``width_m`` or less apart on the floor get ``height_m`` between
+    their heights.
+    """
+    if not drawn:
+        return np.zeros((0, 3))
+    places = np.array([d.middle_m for d in drawn])
+    shown = np.array([d.significant for d in drawn])
+    apart = np.linalg.norm(places[:, None, :2] - places[None, :, :2], axis=2)
+    rivals = (apart < width_m) & shown[:, None] & shown[None]
+    np.fill_diagonal(rivals, False)
+    order = np.argsort(np.argsort(places[:, 2], kind="stable"))
+    above = np.where(order[:, None] > order[None], 1.0, -1.0)
+    for _ in range(200):
+        gap = (places[:, None, 2] - places[None, :, 2]) * above
+        lacking = np.where(rivals, np.clip(height_m - gap, 0.0, None), 0.0)
+        if lacking.max() < 1e-3 * height_m:
+            break
+        places[:, 2] += 0.25 * (lacking * above).sum(axis=1)
+    return places
