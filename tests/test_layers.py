@@ -31,12 +31,15 @@ RESULTS = """
     core.wording core.report core.json_values core.axis_json core.motion_json core.calibration_json
     core.twin
 """
+USE = """
+    core.driven_robot core.pose_iteration core.pose_seeds core.inverse_kinematics
+"""
 APP = """
     app.paths app.progress app.output app.standard_output app.summary
     app.figures app.report_page app.report_cells app.report_words app.report_tables app.report_html
     app.commands app.__main__
 """
-ORDER = (FOUNDATION + FILES + CALIBRATION + RESULTS + APP).split()
+ORDER = (FOUNDATION + FILES + CALIBRATION + RESULTS + USE + APP).split()
 
 DRAWING = {"viser", "plotly", "jinja2", "matplotlib"}
 TABLES = {"pandas"}
