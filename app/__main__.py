@@ -18,10 +18,15 @@ from core.version import VERSION
 DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 COMMANDS = {
+    "serve": "the dashboard in a browser; with no session, a simulated demo cell (this is also what no command means)",
     "calibrate": "calibrate an arm from its single-axis sweeps: JSON, report and tables",
     "simulate": "make a campaign by measuring a simulated arm, with faults if you like",
     "axis": "find one joint axis from a plain CSV of points",
+    "compensate": "find the commands that make the calibrated arm take given poses",
 }
+
+
+SERVE_OPTIONS = ("--host", "--port", "--sessions")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -70,6 +75,7 @@ def _run(given: list[str]) -> int:
 
 
 def _dispatch(given: list[str]) -> int:
+    given = _with_command(given)
     chosen = next((word for word in given if not word.startswith("-")), None)
     command = import_module(f"app.commands.{chosen}") if chosen in COMMANDS else None
     parser = _parser(chosen, command)
@@ -82,6 +88,17 @@ def _dispatch(given: list[str]) -> int:
     else:
         command.run(arguments)
     return DONE
+
+
+def _with_command(given: list[str]) -> list[str]:
+    """``serve`` stands for itself: no command, its options alone, or a session file in place of a command."""
+    if any(word in ("-h", "--help", "--version") for word in given):
+        return given
+    first = next((word for word in given if not word.startswith("-")), None)
+    is_file = first is not None and first not in COMMANDS and os.path.exists(first)
+    if not given or is_file or given[0] in SERVE_OPTIONS or given[0].split("=")[0] in SERVE_OPTIONS:
+        return ["serve", *given]
+    return given
 
 
 def _parser(chosen: str | None, command: ModuleType | None) -> argparse.ArgumentParser:

@@ -119,15 +119,14 @@ def test_axis_refuses_points_that_define_none(text: str, words: tuple[str, ...],
 
 def test_help_and_version() -> None:
     assert trueaxis("--version").stdout == f"trueaxis {VERSION}\n"
-    bare, asked = trueaxis(), trueaxis("--help")
-    assert (bare.returncode, asked.returncode) == (0, 0)
-    assert bare.stdout == asked.stdout
+    asked = trueaxis("--help")
+    assert asked.returncode == 0
     for command in COMMANDS:
         assert command in asked.stdout
         assert trueaxis(command, "--help").returncode == 0
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"], [], ["calibrated"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["calibrated"]])
 def test_nothing_heavy_is_imported_before_a_command_is_known(arguments: list[str]) -> None:
     code = (
         "import sys; from app.__main__ import main; main(sys.argv[1:]); "

@@ -1,0 +1,108 @@
+"""The cell in 3-D: the arm as it stands, its nominal ghost, instruments, shots and axes, kept up with the workbench."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.scene.axes import AxesView, AxisMark
+from app.scene.cameras import Camera, presets
+from app.scene.error_vectors import ErrorVectors
+from app.scene.floor import draw_floor, floor_height, floor_under
+from app.scene.points import PointMarks, PointsView, Verdict
+from app.scene.robot import RobotView
+from app.scene.stations import Station, StationsView
+from app.workbench import Workbench
+from core.calibration import Calibration
+from core.estimate import ArmEstimate
+from core.twin.instruments import TheodolitePair
+
+if TYPE_CHECKING:
+    import viser
+
+ORANGE, BLUE, GREY = (230, 159, 0), (0, 114, 178), (150, 155, 165)
+
+
+class CellView:
+    """All nodes of the scene, and how they follow the workbench."""
+
+    def __init__(self, scene: "viser.SceneApi", bench: Workbench) -> None:
+        self._scene, self._bench = scene, bench
+        scene.configure_default_lights(cast_shadow=False)
+        base = bench.cell.truth.base
+        nominal = tuple(line.moved(base) for line in bench.cell.robot.axes_at_zero())
+        sliding = bench.cell.robot.sliding
+        self.arm = RobotView(scene, "/arm", nominal, sliding)
+        self.ghost = RobotView(scene, "/nominal", nominal, sliding, opacity=0.25, swell_m=0.006)
+        self.ghost.visible = False
+        self._stations = _stations(bench)
+        positions = np.array([s.position_m for s in self._stations]).reshape(-1, 3)
+        height = floor_height(self.arm.bones, positions)
+        corners = np.concatenate([positions, self.arm.bones.hubs_m])
+        draw_floor(scene, floor_under(corners, height))
+        self.stations = StationsView(scene, self._stations, height)
+        self.points = PointsView(scene)
+        self.errors = ErrorVectors(scene)
+        self.errors.visible = False
+        self._floor_m = height
+        self._axes: AxesView | None = None
+        self.drawn: Calibration | None = None
+        """The calibration that is shown."""
+        self.shown_shots: tuple[int, ...] = ()
+        """Ids of the shots in the rows of ``points``."""
+
+    def cameras(self) -> tuple[Camera, ...]:
+        """Where to look from, for the arm as it stands."""
+        return presets(self.arm.bones, self.arm.net, self._stations, self._floor_m)
+
+    def follow(self, commanded: tuple[float, ...]) -> None:
+        """Show the arms where commands put them."""
+        net = self._bench.nominal_net(commanded)
+        self.arm.show(net)
+        self.ghost.show(net)
+        if self._axes is not None:
+            self._axes.show(net)
+
+    def show_shots(self) -> None:
+        """Show every shot of the session, coloured by verdict; the last one marked."""
+        shots = [s for s in self._bench.state.shots if s.taken.point_m is not None and s.superseded_by is None]
+        self.shown_shots = tuple(s.id for s in shots)
+        points = np.array([s.taken.point_m for s in shots]).reshape(-1, 3)
+        verdicts = np.array([_verdict(s.verdict) for s in shots], dtype=int)
+        colours = np.array([GREY if v == Verdict.EXCLUDED else BLUE for v in verdicts], dtype=np.uint8).reshape(-1, 3)
+        self.points.show(PointMarks(np.arange(len(shots)), points, colours, verdicts))
+        self.points.mark_last(points[-1] if len(points) else None)
+        self.stations.aim(points[-1] if len(points) else None)
+
+    def show_calibration(self, found: Calibration) -> None:
+        """Show the fitted axes with their uncertainty, the nominal arm as a ghost, and the residuals."""
+        self.drawn = found
+        marks = axis_marks(found.estimate)
+        self._axes = AxesView(self._scene, "/axes", marks, self._bench.cell.robot.sliding, length_m=0.7)
+        residuals = found.refinement.residuals
+        measured = found.campaign.measurements.point_m[residuals.row]
+        self.errors.show(measured, measured - residuals.residual_m)
+        self.follow(self._bench.robot.commanded)
+
+
+def axis_marks(estimate: ArmEstimate) -> tuple[AxisMark, ...]:
+    """The calibrated axes as the scene takes them."""
+    marks = []
+    for joint, line in enumerate(estimate.arm.axes, 1):
+        direction_std, place_std = estimate.axis_std(joint)
+        marks.append(
+            AxisMark(
+                joint=joint, line=line, middle_m=line.point_m, direction_std_rad=direction_std, point_std_m=place_std
+            )
+        )
+    return tuple(marks)
+
+
+def _stations(bench: Workbench) -> tuple[Station, ...]:
+    pair = bench.cell.instrument
+    if not isinstance(pair, TheodolitePair):
+        return (Station("instrument", np.zeros(3)),)
+    return Station("left", np.asarray(pair.left.position_m)), Station("right", np.asarray(pair.right.position_m))
+
+
+def _verdict(word: str) -> Verdict:
+    return {"kept": Verdict.KEPT, "doubtful": Verdict.DOUBTFUL, "excluded": Verdict.EXCLUDED}[word]

@@ -1,0 +1,168 @@
+"""The dashboard: panels, scene, session and jobs put together. The only module that knows them all.
+
+Left: the operator's way in steps. Middle: the cell in 3-D. Right: what the last shot and the last solve say. Callbacks
+only ask; the worker acts; whatever changes is drawn anew from the session.
+"""
+
+import contextlib
+import io
+import os
+import socket
+import threading
+from pathlib import Path
+
+import viser
+
+from app.cell_view import CellView
+from app.jobs import Jobs
+from app.panels.acquire import AcquirePanel
+from app.panels.export import ExportPanel
+from app.panels.results import ResultsPanel
+from app.panels.seat import Seat
+from app.panels.solve import SolvePanel
+from app.panels.start import StartPanel
+from app.panels.view import ViewPanel
+from app.words import STYLE
+from app.workbench import Workbench
+from core.errors import InputError
+
+
+class Dashboard:
+    """A running dashboard on one session."""
+
+    def __init__(self, bench: Workbench, host: str = "127.0.0.1", port: int = 8080) -> None:
+        """Start the server.
+
+        Raises:
+            InputError: the address cannot be used.
+        """
+        self.bench, self.jobs = bench, Jobs()
+        self.server = _server(host, port)
+        self.host, self.port = host, self.server.get_port()
+        gui = self.server.gui
+        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
+        self.seat = Seat(self.server)
+        self.cell = CellView(self.server.scene, bench)
+        self._look_at_the_cell()
+        gui.main_panel.dock_left()
+        gui.main_panel.set_width(390)
+        gui.add_html(STYLE)
+        self.seat.build(gui)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("1 Cell"):
+            self.start = StartPanel(gui, bench, self.ask)
+        with tabs.add_tab("2 Measure"):
+            self.acquire = AcquirePanel(gui, bench, self.ask)
+        with tabs.add_tab("3 Solve"):
+            self.solve = SolvePanel(gui, bench, self.ask)
+        with tabs.add_tab("4 Export"):
+            self.export = ExportPanel(gui, bench, self.ask)
+        with tabs.add_tab("View"):
+            self.view = ViewPanel(gui, self.cell, self.server)
+        self.results = ResultsPanel(gui, bench)
+        self.cell.points.on_click(self._clicked)
+        bench.on_change(self.refresh)
+        self._hotkeys()
+        self.refresh()
+        gui.add_html("<i data-testid='app-ready' hidden></i>")
+
+    def ask(self, event: "viser.GuiEvent | None", job, operator: bool = True) -> None:
+        """Queue a job for the worker on behalf of whoever pressed something; watchers are told that they only watch."""
+        client = getattr(event, "client", None)
+        if operator and client is not None and not self.seat.may(client.client_id):
+            client.add_notification("You are watching", self.seat.why_not(), color="orange", auto_close_seconds=6)
+            return
+        self.jobs.ask(lambda: job(client), lambda sentence: self.say(client, sentence))
+
+    def say(self, client: "viser.ClientHandle | None", sentence: str) -> None:
+        """Tell whoever asked, or everybody, what went wrong."""
+        for one in [client] if client is not None else self.server.get_clients().values():
+            with contextlib.suppress(Exception):
+                one.add_notification("This was not done", sentence, color="red", auto_close_seconds=15)
+
+    def refresh(self) -> None:
+        """Draw everything anew from the session."""
+        with self.server.atomic():
+            self.cell.show_shots()
+            self.cell.follow(self.bench.robot.commanded)
+            self.start.refresh()
+            self.acquire.refresh()
+            self.solve.refresh()
+            self.results.refresh()
+            if self.bench.calibration is not None and self.results.drawn is not self.cell.drawn:
+                self.cell.show_calibration(self.bench.calibration)
+
+    def stop(self) -> None:
+        """Close server, worker and session."""
+        self.bench.stop()
+        self.jobs.close()
+        self.server.stop()
+        self.bench.session.close()
+
+    def _look_at_the_cell(self) -> None:
+        """What a browser sees first: the arm, with its instruments behind."""
+        camera = next(c for c in self.cell.cameras() if c.name == "Arm")
+        first = self.server.initial_camera
+        first.position, first.look_at, first.up = (tuple(v) for v in (camera.position_m, camera.look_at_m, camera.up))
+
+    def _clicked(self, row: int) -> None:
+        """A shot was clicked in 3-D: choose it in the measuring panel."""
+        if 0 <= row < len(self.cell.shown_shots):
+            self.acquire.choose(self.cell.shown_shots[row])
+
+    def _hotkeys(self) -> None:
+        gui = self.server.gui
+        for label, hotkey, action in (
+            ("Measure the next shot", "space", self.acquire.measure),
+            ("Undo", "backspace", self.acquire.undo),
+            ("Measure the chosen shot again", "R", self.acquire.measure_again),
+            ("Solve", "S", self.solve.solve),
+        ):
+            command = gui.add_command(label, hotkey=hotkey)
+            command.on_trigger(action)
+
+
+def _server(host: str, port: int) -> viser.ViserServer:
+    """A server on exactly this address: viser alone would take the next free port, or hang on a bad host."""
+    if not 0 <= port <= 65535:
+        raise InputError(f"--port {port}: expected 0 to 65535")
+    try:
+        with contextlib.closing(socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
+            free = probe.getsockname()[1]
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"--host {host} --port {port}: {reason}; expected a free port of this machine") from None
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host=host, port=port or free, label="trueaxis", verbose=False)
+    if server.get_port() != (port or free):
+        server.stop()
+        raise InputError(f"--port {port}: it was taken while the server started; expected a free port")
+    # No visitor may open a public tunnel to this machine.
+    server.request_share_url = lambda verbose=True: None
+    return server
+
+
+def run_until(stop: threading.Event, dashboard: Dashboard) -> None:
+    """Serve until the event is set."""
+    try:
+        stop.wait()
+    finally:
+        dashboard.stop()
+
+
+def session_folder(asked: Path | None) -> Path:
+    """Where sessions are kept: as asked, or in the user's data folder; made if it is not there.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    folder = asked or Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "trueaxis"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: {error.strerror or error}; expected a folder for sessions that can be written"
+        ) from None
+    return folder

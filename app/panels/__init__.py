@@ -1,0 +1,1 @@
+"""The panels: each takes the gui, the workbench and a way to ask for work; none computes anything."""

@@ -1,0 +1,141 @@
+"""The right side: the sweep that is being measured, and plots and tables of the last solution."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import plotly.graph_objects as go
+import viser
+
+from app.figures.deviations import deviations_figure
+from app.figures.live import live_figure
+from app.figures.residuals import residual_figure
+from app.figures.style import CONFIG
+from app.figures.transmissions import transmission_figure
+from app.words import block
+from app.workbench import Workbench
+
+if TYPE_CHECKING:
+    from core.calibration import Calibration
+
+WIDTH_PX = 520
+
+
+class ResultsPanel:
+    """Tabs: live, residuals, drives, geometry."""
+
+    def __init__(self, gui: viser.GuiApi, bench: Workbench) -> None:
+        self._bench = bench
+        self.drawn: Calibration | None = None
+        self._live_key: tuple = ()
+        panel = gui.add_panel()
+        with panel.add_tab("This sweep"):
+            self._live = _plot(gui, _empty("Nothing is measured yet"))
+        with panel.add_tab("Residuals"):
+            self._sweep = gui.add_dropdown("Sweep", ("-",))
+            self._sweep.on_update(lambda _: self._draw_sweep())
+            self._residuals = _plot(gui, _empty("Solve to see residuals"))
+        with panel.add_tab("Drives"):
+            self._joint = gui.add_dropdown("Joint", ("-",))
+            self._joint.on_update(lambda _: self._draw_joint())
+            self._drive = _plot(gui, _empty("Solve to see what the drives do"))
+        with panel.add_tab("Geometry"):
+            self._deviations = _plot(gui, _empty("Solve every joint to compare with the design"))
+            self._table = gui.add_html(
+                block("<p class='soft'>Solve every joint to compare with the design.</p>", "table2")
+            )
+        panel.dock_right()
+        panel.set_width(540)
+
+    def refresh(self) -> None:
+        """Draw what has changed."""
+        self._draw_live()
+        found = self._bench.calibration
+        if found is None or found is self.drawn:
+            return
+        self.drawn = found
+        sweeps = tuple(f.sweep.name for f in found.found.fits)
+        joints = tuple(str(j) for j in found.found.swept)
+        _offer(self._sweep, sweeps)
+        _offer(self._joint, joints)
+        self._draw_sweep()
+        self._draw_joint()
+        figure = deviations_figure(found)
+        self._deviations.figure = (
+            figure if figure is not None else _empty("Solve every joint to compare with the design")
+        )
+        self._table.content = table_2(found)
+
+    def _draw_live(self) -> None:
+        state = self._bench.state
+        last = next((s for s in reversed(state.shots) if s.taken.phase == "sweep"), None)
+        key = (state.changed_utc, len(state.shots), None if last is None else last.id)
+        if last is None or key == self._live_key:
+            return
+        self._live_key = key
+        joint = last.taken.joint
+        live, shots = self._bench.live(joint, last.taken.sweep)
+        command = np.array([s.taken.commanded[joint - 1] for s in shots])
+        self._live.figure = live_figure(live, command, joint, bool(self._bench.cell.robot.sliding[joint - 1]), WIDTH_PX)
+
+    def _draw_sweep(self) -> None:
+        found = self.drawn
+        if found is not None:
+            names = [f.sweep.name for f in found.found.fits]
+            if self._sweep.value in names:
+                self._residuals.figure = residual_figure(found, names.index(self._sweep.value))
+
+    def _draw_joint(self) -> None:
+        found = self.drawn
+        if found is not None and self._joint.value in {str(j) for j in found.found.swept}:
+            self._drive.figure = transmission_figure(found, int(self._joint.value))
+
+
+def table_2(found: "Calibration") -> str:
+    """Nominal, actual, difference and uncertainty of every parameter."""
+    geometry = found.estimate.geometry
+    if geometry is None or found.nominal is None:
+        missing = ", ".join(map(str, found.not_swept)) or "some"
+        return block(f"<p class='soft'>The geometry needs every joint; not swept yet: {missing}.</p>", "table2")
+    rows = ""
+    scales = ((1e3, "mm"), (1e3, "mm"), (180 / np.pi, "deg"), (180 / np.pi, "deg"))
+    for i, (nominal, actual, std) in enumerate(
+        zip(found.nominal.parameters, geometry.model.parameters, geometry.std, strict=True)
+    ):
+        for k, name in enumerate(("a", "b", "α", "θ")):
+            scale, unit = scales[k]
+            if std[k] == 0:
+                continue
+            difference, u = (actual[k] - nominal[k]) * scale, std[k] * scale
+            digits = int(np.clip(1 - np.floor(np.log10(u)), 0, 4))
+            mark = "<span class='bad'>▲</span>" if abs(difference) > 2 * u else "○"
+            rows += (
+                f"<tr><td>{name}<sub>{i + 1}</sub></td><td class='n'>{nominal[k] * scale + 0.0:z.{digits}f}</td>"
+                f"<td class='n'>{actual[k] * scale:z.{digits}f}</td><td class='n'>{difference:+.{digits}f}</td>"
+                f"<td class='n'>{u:.{digits}f}</td><td>{unit}</td><td>{mark}</td></tr>"
+            )
+    numbers = "".join(f"<th class='n'>{name}</th>" for name in ("Nominal", "Actual", "Difference", "±u"))
+    head = f"<tr><th></th>{numbers}<th></th><th></th></tr>"
+    note = (
+        "<p class='soft'>▲ deviates by more than two standard uncertainties u. "
+        "Parameters fixed by convention are left out.</p>"
+    )
+    return block(f"<table>{head}{rows}</table>{note}", "table2")
+
+
+def _plot(gui: viser.GuiApi, figure: go.Figure) -> viser.GuiPlotlyHandle:
+    return gui.add_plotly(figure, aspect=0.8, config=CONFIG)
+
+
+def _offer(dropdown: viser.GuiDropdownHandle, options: tuple[str, ...]) -> None:
+    chosen = dropdown.value
+    dropdown.options = options
+    dropdown.value = chosen if chosen in options else options[0]
+
+
+def _empty(text: str) -> go.Figure:
+    figure = go.Figure()
+    figure.add_annotation(text=text, showarrow=False, font={"size": 14, "color": "#6b7280"})
+    figure.update_layout(
+        template="none", xaxis={"visible": False}, yaxis={"visible": False}, margin={"l": 10, "r": 10, "t": 10, "b": 10}
+    )
+    return figure

@@ -1,0 +1,269 @@
+"""What the dashboard works on: one session, the cell it is measured in, and the last calibration.
+
+Nothing here draws. Everything that an operator decides or an instrument sees goes into the session first; listeners are
+told after it is on the disk. Any thread may call; one measurement runs at a time.
+"""
+
+import hashlib
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from core.calibration import Calibration, calibrate
+from core.calibration_json import calibration_to_json
+from core.geometry import Array
+from core.instruments import Desk, MeasureRequest, Reading
+from core.kinematics import nominal_net
+from core.live_sweep import LiveSweep, live_sweep
+from core.session import Session
+from core.session_campaign import to_campaign
+from core.session_events import Failed, Judged, SessionError, ShotTaken, Skipped, Solved, WentTo
+from core.session_plan import PlannedSweep, Step
+from core.session_state import Shot, State
+from core.twin.cell import Cell
+from core.twin.instrument import DemoInstrument, DemoRobot
+from core.version import VERSION
+
+TIMEOUT_S = 30.0
+
+
+@dataclass(frozen=True)
+class SweepProgress:
+    """One row of the living table of sweeps."""
+
+    planned: PlannedSweep
+    done: int
+    excluded: int
+    current: bool
+
+    @property
+    def finished(self) -> bool:
+        return self.done >= self.planned.shots
+
+
+class Workbench:
+    """A session at work on the demo cell."""
+
+    def __init__(self, session: Session, cell: Cell, seed: int = 1) -> None:
+        self.session, self.cell = session, cell
+        before = len(session.state.shots)
+        self.robot = DemoRobot(cell, seed, visits_before=before)
+        self.desk = Desk(DemoInstrument(cell, self.robot, seed, shots_before=before))
+        self.calibration: Calibration | None = None
+        self.previous: Calibration | None = None
+        self._listeners: list[Callable[[], None]] = []
+        self._one_shot = threading.Lock()
+        self._stop = threading.Event()
+
+    @property
+    def state(self) -> State:
+        return self.session.state
+
+    def on_change(self, listener: Callable[[], None]) -> None:
+        """Be told, with no arguments, after anything changed."""
+        self._listeners.append(listener)
+
+    def changed(self) -> None:
+        """Tell all listeners."""
+        for listener in self._listeners:
+            listener()
+
+    def measure(self, by: str | None = None) -> Shot:
+        """Send the robot to the next planned stop and measure it; when this returns the shot is on the disk.
+
+        Raises:
+            SessionError: nothing is left to measure, or the session is read-only.
+            InstrumentFailed: robot or instrument did not do it; this is noted in the session too.
+        """
+        with self._one_shot:
+            step = self.state.next_step
+            if step is None:
+                raise SessionError("every planned shot is done; solve, or plan more sweeps")
+            shot = self._shoot(step, None, by)
+        self.changed()
+        return shot
+
+    def measure_again(self, number: int, by: str | None = None) -> Shot:
+        """Measure the stop of a shot again; the old shot is kept and no longer counts.
+
+        Raises:
+            SessionError: there is no such shot in the plan.
+            InstrumentFailed: as for ``measure``.
+        """
+        with self._one_shot:
+            old = self.state.shot(number)
+            step = next((s for s in self.state.steps if old is not None and s.key == old.key), None)
+            if old is None or step is None:
+                raise SessionError(f"shot {number} belongs to no planned stop, so that it cannot be measured again")
+            shot = self._shoot(step, number, by)
+        self.changed()
+        return shot
+
+    def run(self, whole_plan: bool, by: str | None = None, progress: Callable[[int, int], None] | None = None) -> int:
+        """Let the demo robot do this sweep, or all of them, until done or stopped; the number of shots taken."""
+        self._stop.clear()
+        first = self.state.next_step
+        taken, total = 0, self._left(first, whole_plan)
+        while not self._stop.is_set():
+            step = self.state.next_step
+            if step is None or (not whole_plan and first is not None and _sweep_of(step) != _sweep_of(first)):
+                break
+            self.measure(by)
+            taken += 1
+            if progress is not None:
+                progress(taken, max(total, taken))
+        return taken
+
+    def stop(self) -> None:
+        """Stop a run after the shot in progress, and cancel that."""
+        self._stop.set()
+        self.desk.cancel()
+
+    def skip(self, reason: str, by: str | None = None) -> None:
+        """Leave out the next planned shot."""
+        step = self.state.next_step
+        if step is None:
+            raise SessionError("every planned shot is done; there is nothing to skip")
+        joint, sweep, index, sense, target = step.key
+        self.session.append(Skipped(joint, sweep, index, sense, target, reason), by)
+        self.changed()
+
+    def go_to(self, joint: int, sweep: int, by: str | None = None) -> None:
+        """Go on with the first open shot of another sweep."""
+        closed = self.state.done | self.state.skipped.keys()
+        steps = [s for s in self.state.steps if _sweep_of(s) == (joint, sweep)]
+        step = next((s for s in steps if s.key not in closed), None)
+        if step is None:
+            raise SessionError(f"joint {joint}, sweep {sweep} is done; choose a sweep with open shots")
+        self.session.append(WentTo(*step.key), by)
+        self.changed()
+
+    def exclude(self, number: int, reason: str, by: str | None = None) -> None:
+        """Leave a shot out of every fit, with the reason; it is kept."""
+        self.session.append(Judged((number,), "excluded", reason), by)
+        self.changed()
+
+    def include(self, number: int, by: str | None = None) -> None:
+        """Let a shot count again."""
+        self.session.append(Judged((number,), "kept"), by)
+        self.changed()
+
+    def undo(self, by: str | None = None) -> None:
+        """Take back the last decision or shot."""
+        self.session.undo(by)
+        self.changed()
+
+    def redo(self, by: str | None = None) -> None:
+        """Bring back what was taken back last."""
+        self.session.redo(by)
+        self.changed()
+
+    def solve(self, by: str | None = None) -> Calibration:
+        """Calibrate from the shots that count.
+
+        Raises:
+            TrueaxisError: the shots do not allow it; the sentence says why.
+        """
+        state = self.state
+        campaign = to_campaign(state)
+        found = calibrate(campaign)
+        digest = hashlib.sha256(calibration_to_json(found).encode()).hexdigest()
+        self.session.append(
+            Solved(digest, len(found.refinement.residuals.row), VERSION, {"noise_mm": found.estimate.noise_m * 1e3}), by
+        )
+        self.previous, self.calibration = self.calibration, found
+        self.changed()
+        return found
+
+    def progress(self) -> tuple[SweepProgress, ...]:
+        """All planned sweeps with what is done of them."""
+        state = self.state
+        current = state.next_step
+        rows = []
+        for planned in state.plan.sweeps:
+            here = [s for s in state.shots if s.superseded_by is None and _of_sweep(s, planned.joint, planned.sweep)]
+            excluded = sum(1 for s in here if not s.counts)
+            is_current = current is not None and _sweep_of(current) == (planned.joint, planned.sweep)
+            rows.append(SweepProgress(planned, len(here), excluded, is_current))
+        return tuple(rows)
+
+    def live(self, joint: int, sweep: int) -> tuple[LiveSweep, tuple[Shot, ...]]:
+        """The axis of a sweep so far, and the shots that it rests on."""
+        links = self.state.target_links
+        coupled = self.cell.robot.coupling_from(joint) is not None
+        shots = tuple(
+            s
+            for s in self.state.shots
+            if s.counts
+            and s.taken.point_m is not None
+            and _of_sweep(s, joint, sweep)
+            and (links[s.taken.target] == joint or (links[s.taken.target] > joint and not coupled))
+        )
+        points = np.array([s.taken.point_m for s in shots]).reshape(-1, 3)
+        command = np.array([s.taken.commanded[joint - 1] for s in shots])
+        names = [s.taken.target for s in shots]
+        target = np.unique(names, return_inverse=True)[1] if names else None
+        sliding = bool(self.cell.robot.sliding[joint - 1])
+        return live_sweep(points, command, sliding=sliding, target=target, covariance_m2=_covariances(shots)), shots
+
+    def nominal_net(self, commanded: tuple[float, ...] | Array) -> Array:
+        """Net displacements from the marks that the nominal arm believes in, (n,)."""
+        home = np.zeros(len(commanded)) if self.state.plan.home is None else np.array(self.state.plan.home)
+        return nominal_net(self.cell.robot, np.array(commanded) - home)[0]
+
+    def _shoot(self, step: Step, replaces: int | None, by: str | None) -> Shot:
+        try:
+            if step.start is not None:
+                self.robot.move_to(step.start, self._stop.is_set)
+            self.robot.move_to(step.commanded, lambda: False)
+            reading = self.desk.measure(MeasureRequest(step.target, step.commanded), TIMEOUT_S)
+        except Exception as wrong:
+            self.session.append(Failed(str(wrong) or type(wrong).__name__), by)
+            raise
+        return self.session.append(_shot(step, reading, replaces), by).shots[-1]
+
+    def _left(self, first: Step | None, whole_plan: bool) -> int:
+        closed = self.state.done | self.state.skipped.keys()
+        return sum(
+            1
+            for s in self.state.steps
+            if s.key not in closed and (whole_plan or (first is not None and _sweep_of(s) == _sweep_of(first)))
+        )
+
+
+def _shot(step: Step, reading: Reading, replaces: int | None) -> ShotTaken:
+    approach = [0] * len(step.commanded)
+    approach[step.joint - 1] = step.sense
+    event = ShotTaken(
+        target=step.target,
+        commanded=step.commanded,
+        point_m=reading.point_m,
+        covariance_m2=reading.covariance_m2,
+        joint=step.joint,
+        sweep=step.sweep,
+        step=step.step,
+        approach=tuple(approach),
+        angles_rad=reading.angles_rad,
+        time_s=reading.time_s,
+        temperature_c=reading.temperature_c,
+        arm_temperature_c=reading.arm_temperature_c,
+    )
+    return event if replaces is None else msgspec.structs.replace(event, replaces=replaces)
+
+
+def _covariances(shots: tuple[Shot, ...]) -> Array | None:
+    stated = [s.taken.covariance_m2 for s in shots]
+    if not stated or any(c is None for c in stated):
+        return None
+    return np.array(stated)[:, np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])]
+
+
+def _sweep_of(step: Step) -> tuple[int, int]:
+    return step.joint, step.sweep
+
+
+def _of_sweep(shot: Shot, joint: int, sweep: int) -> bool:
+    return shot.taken.joint == joint and shot.taken.sweep == sweep

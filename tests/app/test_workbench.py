@@ -1,0 +1,148 @@
+"""What the dashboard works on: measuring, judging, solving, all of it in the session first."""
+
+import numpy as np
+import pytest
+
+from app.workbench import Workbench
+from core.errors import AxisUndefined, TrueaxisError
+from core.instruments import InstrumentFailed
+from core.session import Session
+from core.session_events import SessionError
+from core.session_store import SUFFIX
+from core.twin import irb_l6
+from core.twin.demo import demo_events
+
+
+@pytest.fixture
+def bench(tmp_path):
+    cell = irb_l6.cell()
+    session = Session.create(tmp_path / f"a{SUFFIX}", demo_events(cell), by="A. Operator")
+    yield Workbench(session, cell)
+    session.close()
+
+
+def test_a_shot_is_in_the_file_before_listeners_hear_of_it(bench):
+    seen = []
+    bench.on_change(lambda: seen.append(len(Session.open(bench.session.path, read_only=True).state.shots)))
+    bench.measure()
+    bench.measure()
+    assert seen == [1, 2]
+
+
+def test_joint_6_comes_first_and_the_plan_is_walked_in_order(bench):
+    bench.measure()
+    rows = bench.progress()
+    assert [row.planned.joint for row in rows] == [6, 5, 4, 3, 2, 1]
+    assert [row.done for row in rows] == [1, 0, 0, 0, 0, 0]
+    assert rows[0].current
+
+
+def test_run_this_sweep_stops_at_its_end(bench):
+    told = []
+    assert bench.run(False, progress=lambda done, total: told.append((done, total))) == 17
+    assert told[-1] == (17, 17)
+    assert bench.progress()[0].finished
+    assert not bench.progress()[1].done
+
+
+def test_run_all_then_solve_finds_the_arm(bench):
+    assert bench.run(True) == 129
+    found = bench.solve()
+    assert found.not_swept == ()
+    true = bench.cell.truth
+    geometry = found.estimate.geometry
+    scores = (
+        (geometry.model.parameters - true.phi.parameters) / np.where(geometry.std > 0, geometry.std, np.inf)
+    ).ravel()
+    assert np.abs(scores).max() < 4.5
+    assert bench.state.solves[-1].solved.shots == 129
+    with pytest.raises(SessionError, match="every planned shot is done"):
+        bench.measure()
+
+
+def test_undo_takes_the_last_shot_back_and_redo_brings_it_again(bench):
+    bench.measure()
+    first = bench.measure()
+    bench.undo()
+    assert [s.id for s in bench.state.shots][-1] != first.id
+    bench.redo()
+    assert bench.state.shots[-1].id == first.id
+
+
+def test_an_excluded_shot_is_kept_and_does_not_count(bench):
+    bench.run(False)
+    number = bench.state.shots[4].id
+    with_all = bench.live(6, 1)[1]
+    bench.exclude(number, "target was bumped")
+    assert bench.state.shot(number).reason == "target was bumped"
+    assert len(bench.live(6, 1)[1]) == len(with_all) - 1
+    bench.include(number)
+    assert len(bench.live(6, 1)[1]) == len(with_all)
+
+
+def test_measuring_again_supersedes(bench):
+    bench.run(False)
+    old = bench.state.shots[3]
+    new = bench.measure_again(old.id)
+    assert new.taken.replaces == old.id
+    assert not bench.state.shot(old.id).counts
+    assert new.taken.commanded == old.taken.commanded
+    with pytest.raises(SessionError, match="belongs to no planned stop"):
+        bench.measure_again(10**6)
+
+
+def test_skip_and_go_to_another_sweep(bench):
+    bench.skip("sight was blocked")
+    assert bench.state.next_step.step == 1
+    bench.go_to(3, 1)
+    assert bench.state.next_step.joint == 3
+    bench.run(False)
+    with pytest.raises(SessionError, match="is done"):
+        bench.go_to(3, 1)
+
+
+def test_couplings_hold_the_next_motor_still(bench):
+    bench.go_to(2, 1)
+    step = bench.state.next_step
+    home = np.array(bench.state.plan.home)
+    moved = np.array(step.commanded) - home
+    assert moved[2] == pytest.approx(-moved[1])
+
+
+def test_a_failure_is_noted_and_loses_nothing(bench, monkeypatch):
+    bench.measure()
+
+    def fail(request, cancelled):
+        raise InstrumentFailed("the reflector is not in sight; aim again")
+
+    monkeypatch.setattr(bench.desk.meter, "measure", fail)
+    with pytest.raises(InstrumentFailed, match="not in sight"):
+        bench.measure()
+    assert len(bench.state.shots) == 1
+    assert bench.state.failures[-1].sentence == "the reflector is not in sight; aim again"
+
+
+def test_too_few_shots_are_no_calibration(bench):
+    for _ in range(3):
+        bench.measure()
+    with pytest.raises(AxisUndefined, match="too few"):
+        bench.solve()
+    assert bench.calibration is None
+
+
+def test_a_session_goes_on_where_it_was_and_with_fresh_noise(bench):
+    bench.run(False)
+    path, points = bench.session.path, [s.taken.point_m for s in bench.state.shots]
+    bench.session.close()
+    again = Workbench(Session.open(path), bench.cell)
+    try:
+        assert again.state.next_step.joint == 5
+        assert again.measure().taken.point_m not in points
+    finally:
+        again.session.close()
+
+
+def test_a_read_only_session_refuses_in_a_sentence(bench):
+    watching = Workbench(Session.open(bench.session.path), bench.cell)
+    with pytest.raises(TrueaxisError):
+        watching.measure()
