@@ -188,6 +188,8 @@ class Session:
             self._writer = Writer(self.path)
             self._write(unconfirmed)
             self._add_own(Opened(VERSION), None)
+            # The file itself says from now on that it is open, even if its journal gets lost.
+            self._writer.checkpoint()
         except SessionError as refused:
             self.why_read_only = str(refused)
             if self._writer is not None:

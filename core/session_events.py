@@ -13,7 +13,7 @@ from msgspec import Meta
 from core.errors import InputError
 from core.input_files import shown
 from core.session_plan import PlannedSweep, StepKey
-from core.session_values import Line, Number, Numbers, Point, PositiveInt, Text, UpperTriangle
+from core.session_values import Line, Number, Numbers, Point, PositiveInt, SomeNumbers, Text, UpperTriangle
 
 LONGEST_EVENT_BYTES = 8_000_000
 Verdict = Literal["kept", "doubtful", "excluded"]
@@ -99,7 +99,7 @@ class InstrumentChosen(Event, frozen=True, tag="instrument"):
     instrument: Literal["theodolite-pair", "total-station", "laser-tracker", "other"]
     sigma_m: Annotated[float, Meta(gt=0, le=1e12)] | None = None
     """Promised standard deviation of one coordinate."""
-    description: dict[Line, Line] = {}
+    description: dict[Line, Text] = {}
     """Model, serial number, last calibration, ..."""
 
 
@@ -116,7 +116,7 @@ class Fact(Event, frozen=True, tag="fact"):
     """Something worth keeping with the data: a serial number, a place, the payload; an empty value takes it away."""
 
     key: Line
-    value: Line
+    value: Text
 
 
 class Setting(Event, frozen=True, tag="setting"):
@@ -157,8 +157,8 @@ class ShotTaken(Event, frozen=True, tag="shot"):
     arm_temperature_c: Number | None = None
     payload_kg: Number | None = None
     speed: Numbers | None = None
-    torque_nm: Numbers | None = None
-    readback: Numbers | None = None
+    torque_nm: SomeNumbers | None = None
+    readback: SomeNumbers | None = None
     target_quaternion: tuple[Number, Number, Number, Number] | None = None
     simulated_point_m: Point | None = None
 

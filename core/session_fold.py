@@ -100,19 +100,22 @@ def _setting(state: State, entry: Entry, event: Setting) -> dict[str, Any]:
 def _shot(state: State, entry: Entry, event: ShotTaken) -> dict[str, Any]:
     record = event.record or state.next_record
     shot = Shot(entry.seq, entry.utc, entry.by, record, event)
-    shots = state.shots
-    old = None if event.replaces is None else state.shot(event.replaces)
-    if old is not None:
-        place = shots.index(old)
-        shots = (*shots[:place], replace(old, superseded_by=entry.seq), *shots[place + 1 :])
-    changes = {"shots": (*shots, shot), "next_record": max(record + 1, state.next_record)}
+    shots = [*state.shots, shot]
+    place = None if event.replaces is None else state.place_of(event.replaces)
+    if place is not None:
+        shots[place] = replace(shots[place], superseded_by=entry.seq)
+    changes = {"shots": tuple(shots), "next_record": max(record + 1, state.next_record)}
     return changes if shot.key is None else changes | {"cursor": shot.key}
 
 
 def _judged(state: State, entry: Entry, event: Judged) -> dict[str, Any]:
-    meant = set(event.shots)
-    judgement = {"verdict": event.verdict, "reason": event.reason, "judged_by": entry.by}
-    return {"shots": tuple(replace(shot, **judgement) if shot.id in meant else shot for shot in state.shots)}
+    shots = list(state.shots)
+    for number in event.shots:
+        place = state.place_of(number)
+        if place is not None:
+            judgement = {"verdict": event.verdict, "reason": event.reason, "judged_by": entry.by}
+            shots[place] = replace(shots[place], **judgement)
+    return {"shots": tuple(shots)}
 
 
 def _skipped(state: State, entry: Entry, event: Skipped) -> dict[str, Any]:

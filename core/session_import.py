@@ -55,13 +55,13 @@ def campaign_events(folder: Path | str) -> list[Event]:
     instrument, notes = campaign.instrument, dict(campaign.notes)
     events: list[Event] = [
         Titled(campaign.title),
-        OperatorNamed(notes.pop(OPERATOR, "")),
+        OperatorNamed(_line(notes.pop(OPERATOR, ""))),
         _robot_event(Path(folder)),
         TargetsNamed(tuple(TargetEntry(t.name, t.link, t.point_m, t.sigma_m) for t in campaign.targets)),
-        InstrumentChosen(instrument.kind, instrument.sigma_m, instrument.description),
+        InstrumentChosen(instrument.kind, instrument.sigma_m, _texts(instrument.description)),
         Planned(sweeps_of(campaign), None if campaign.home is None else campaign.home, campaign.joint_values),
     ]
-    events += [Fact(key[:200], value[:200]) for key, value in notes.items()]
+    events += [Fact(_line(key), _text(value)) for key, value in notes.items()]
     return events + shots_of(campaign)
 
 
@@ -114,9 +114,24 @@ def shots_of(campaign: Campaign) -> list[ShotTaken]:
 
 
 def _one(column: Array | None, row: int) -> Any:
-    if column is None or not np.isfinite(column[row]).all():
+    """One row of a column that may be missing; nothing for what is not a number."""
+    if column is None or np.isnan(column[row]).all():
         return None
-    return column[row]
+    values = column[row].tolist()
+    return [None if value != value else value for value in values] if column.ndim > 1 else values
+
+
+def _line(text: str) -> str:
+    return " ".join(_text(text).split())[:200]
+
+
+def _text(text: str) -> str:
+    """Without characters that no event holds, and not longer than one."""
+    return "".join(c if c in "\n\t" or (c >= " " and c != "\x7f") else " " for c in text)[:10_000]
+
+
+def _texts(texts: dict[str, str]) -> dict[str, str]:
+    return {_line(key): _text(text) for key, text in texts.items()}
 
 
 def _robot_event(folder: Path) -> RobotChosen:

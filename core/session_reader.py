@@ -16,10 +16,11 @@ from shutil import copyfile
 
 from core.session_entries import SESSION_FORMAT, DamagedEntry, Entry, carved, decoded, newer
 from core.session_events import Closed, Copied, Opened, SessionError
-from core.session_store import APPLICATION, SCHEMA, connect
+from core.session_store import APPLICATION, SCHEMA, TROUBLE, connect
 
 LARGEST_FILE_BYTES = 1_000_000_000
 MOST_SENTENCES = 20
+LATEST_THINKABLE_FORMAT = 1000
 JOURNALS = ("-wal", "-journal")
 MOST_QUESTIONS = 20_000
 """To a damaged file."""
@@ -55,8 +56,10 @@ def read_contents(path: Path, in_use: bool = False) -> Contents:
     check_readable(path)
     try:
         contents = _read(path)
-    except (sqlite3.Error, DamagedFile) as wrong:
-        return _salvage(path, " ".join(str(wrong).split()))
+    except (*TROUBLE, DamagedFile) as wrong:
+        # SQLite's message may quote bytes of the file that are no text.
+        unreadable = isinstance(wrong, UnicodeDecodeError)
+        return _salvage(path, "its table of events cannot be read" if unreadable else " ".join(str(wrong).split()))
     return contents if in_use or contents.broken else _with_open_end(path, contents)
 
 
@@ -70,7 +73,7 @@ def read_after(path: Path, seq: int) -> tuple[Entry, ...]:
     try:
         with closing(connect(path, "ro")) as connection:
             return _rows(connection, path, seq).entries
-    except sqlite3.Error as wrong:
+    except TROUBLE as wrong:
         raise SessionError(f"{path} cannot be read: {wrong}") from None
 
 
@@ -122,6 +125,8 @@ def _check_is_session(connection: sqlite3.Connection, path: Path) -> None:
     application, form = (connection.execute(f"PRAGMA {name}").fetchone()[0] for name in pragmas)
     if application != APPLICATION:
         raise DamagedFile("it does not say that it is a session")
+    if form > LATEST_THINKABLE_FORMAT:
+        raise DamagedFile("its format has no sensible number")
     if form > SESSION_FORMAT:
         raise SessionError(f"{path} {newer(form)}")
     schema = {row[0] for row in connection.execute("SELECT sql FROM sqlite_master")}
@@ -163,7 +168,7 @@ def _with_open_end(path: Path, contents: Contents) -> Contents:
     if not beyond:
         return contents
     found = tuple(beyond[seq] for seq in sorted(beyond))
-    told = f"{len(found)} events at the end stood in the journal without being confirmed, and were taken over"
+    told = f"{_counted(len(found))} at the end stood in the journal without being confirmed: taken over"
     return Contents((*contents.entries, *found), found, (*contents.warnings, told))
 
 
@@ -181,10 +186,9 @@ def _salvage(path: Path, reason: str) -> Contents:
         if entry.seq > expected:
             gaps.append(_missing(expected, entry.seq - 1))
         expected = entry.seq + 1
-    told = (
-        f"the file is damaged ({reason}): {len(entries)} events are intact, up to {entries[-1].utc}; anything after"
-        " them is lost; save a copy to go on with it"
-    )
+    told = f"the file is damaged ({reason}): of its events {len(entries)} are intact; save a copy to go on with them"
+    if not isinstance(entries[-1].event, Closed | Copied):
+        gaps.append(f"anything after event {entries[-1].seq} ({entries[-1].utc}) is lost")
     return Contents(entries, warnings=(told, *_few(gaps)), broken=True)
 
 
@@ -203,12 +207,12 @@ def _readable_rows(path: Path, last: int) -> list[Entry]:
                         "SELECT seq, entry FROM events WHERE seq BETWEEN ? AND ?", (low, high)
                     ).fetchall()
                     entries += _intact(rows)
-                except sqlite3.DatabaseError as wrong:
+                except TROUBLE as wrong:
                     if "interrupted" in str(wrong) or "no such" in str(wrong):
                         break
                     middle = (low + high) // 2
                     ranges += [(low, middle), (middle + 1, high)] if low < high else []
-    except sqlite3.Error:
+    except TROUBLE:
         pass
     return entries
 
@@ -238,6 +242,10 @@ def _journal_bytes(path: Path) -> bytes:
         return _journal(path).read_bytes()
     except OSError:
         return b""
+
+
+def _counted(count: int) -> str:
+    return "1 event" if count == 1 else f"{count} events"
 
 
 def _missing(first: int, last: int) -> str:

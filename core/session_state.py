@@ -179,8 +179,13 @@ class State:
 
     def shot(self, number: int) -> Shot | None:
         """The shot with this id."""
+        place = self.place_of(number)
+        return None if place is None else self.shots[place]
+
+    def place_of(self, number: int) -> int | None:
+        """The place in ``shots`` of the shot with this id."""
         place = bisect_left(self.shots, number, key=lambda shot: shot.id)
-        return self.shots[place] if place < len(self.shots) and self.shots[place].id == number else None
+        return place if place < len(self.shots) and self.shots[place].id == number else None
 
 
 @lru_cache(maxsize=8)

@@ -21,6 +21,8 @@ APPLICATION = 0x54724178
 """``TrAx``: SQLite's mark of what a file is."""
 PATIENCE_S = 20.0
 """No honest file takes longer to read."""
+TROUBLE = (sqlite3.Error, UnicodeDecodeError, MemoryError)
+"""What Python's SQLite raises over a damaged file; its messages may quote bytes that are no text."""
 SCHEMA = (
     "CREATE TABLE events (seq INTEGER PRIMARY KEY, entry TEXT NOT NULL)",
     "CREATE TRIGGER unchangeable BEFORE UPDATE ON events BEGIN SELECT RAISE(ABORT, 'events are never changed'); END",
@@ -43,6 +45,8 @@ class Writer:
             self._connection.set_progress_handler(None, 0)
             self._connection.execute("PRAGMA journal_mode = WAL")
             self._connection.execute("PRAGMA synchronous = FULL")
+            # Little is lost then if somebody takes the file alone away, without its journal.
+            self._connection.execute("PRAGMA wal_autocheckpoint = 100")
             self._connection.execute(f"PRAGMA user_version = {SESSION_FORMAT}")
 
     def append(self, entries: Iterable[Entry]) -> None:
@@ -55,13 +59,18 @@ class Writer:
         with _told(self._path, "nothing was saved, and nothing before it is lost"), _transaction(self._connection):
             self._connection.executemany("INSERT INTO events VALUES (?, ?)", rows)
 
+    def checkpoint(self) -> None:
+        """Bring what the journal holds into the file, as far as readers allow."""
+        with contextlib.suppress(*TROUBLE):
+            self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)")
+
     def close(self) -> None:
         """Bring everything into the one file and let it go."""
-        with contextlib.suppress(sqlite3.Error):
+        with contextlib.suppress(*TROUBLE):
             self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
             # Back to one plain file; while others read it, it stays as it is.
             self._connection.execute("PRAGMA journal_mode = DELETE")
-        with contextlib.suppress(sqlite3.Error):
+        with contextlib.suppress(*TROUBLE):
             self._connection.close()
 
 
@@ -88,7 +97,7 @@ def write_new(path: Path, entries: Iterable[Entry]) -> None:
         SessionError: there is such a file, or the folder cannot be written to.
     """
     with _new_database(path) as connection:
-        for line in (f"application_id = {APPLICATION}", f"user_version = {SESSION_FORMAT}", "page_size = 8192"):
+        for line in ("page_size = 8192", f"application_id = {APPLICATION}", f"user_version = {SESSION_FORMAT}"):
             connection.execute(f"PRAGMA {line}")
         # A journal on the disk is of no use to a file that nobody sees before it is complete.
         connection.execute("PRAGMA journal_mode = MEMORY")
@@ -161,7 +170,7 @@ def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
         yield
         connection.execute("COMMIT")
     except BaseException:
-        with contextlib.suppress(sqlite3.Error):
+        with contextlib.suppress(*TROUBLE):
             connection.execute("ROLLBACK")
         raise
 
@@ -175,7 +184,7 @@ def _told(path: Path, what: str) -> Iterator[None]:
         raise SessionError(f"{path} is there already, expected the name of a new file") from None
     except sqlite3.IntegrityError:
         raise SessionError(f"{path}: another program wrote to this session meanwhile; {what}") from None
-    except (sqlite3.Error, OSError) as wrong:
+    except (*TROUBLE, OSError) as wrong:
         raise SessionError(f"{path}: {_reason(wrong)}; {what}") from None
 
 

@@ -8,6 +8,8 @@ Number = Annotated[float, Meta(ge=-1e12, le=1e12)]
 """Finite; nothing that is measured is larger."""
 Numbers = Annotated[tuple[Number, ...], Meta(max_length=100)]
 """One a joint, or one an angle."""
+SomeNumbers = Annotated[tuple[Number | None, ...], Meta(max_length=100)]
+"""One a joint; None where nothing was recorded."""
 Point = tuple[Number, Number, Number]
 UpperTriangle = tuple[Number, Number, Number, Number, Number, Number]
 """A symmetric 3x3 matrix: xx, xy, xz, yy, yz, zz."""

@@ -22,7 +22,7 @@ from core.measurements import Instrument
 from core.theodolite import intersect
 from core.twin.cell import Cell, carried, chain
 from core.twin.instruments import TheodolitePair
-from core.twin.noise import Noise, Repeatability
+from core.twin.noise import MEAN_LENGTH, Noise, Repeatability
 from core.twin.protocol import Schedule
 
 UPPER = ((0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2))
@@ -30,7 +30,10 @@ ALL_NOISE = Noise()
 
 
 class DemoRobot(RobotDriver):
-    """The twin's arm: at every visit each link stands a little off, as its repeatability has it."""
+    """The twin's arm: at every visit each link stands a little off, as its repeatability has it.
+
+    The statistics are those of simulated campaigns, where a target that is seen alone shows a link's shift only.
+    """
 
     def __init__(
         self, cell: Cell, seed: int, visits_before: int = 0, noise: Noise = ALL_NOISE, seconds_a_move: float = 0.0
@@ -61,9 +64,17 @@ class DemoRobot(RobotDriver):
         net = true.arm.net(np.array([self.commanded]))
         motions = chain(true.arm.axes, cell.robot.sliding, net).repeat(len(true.links), axis=0)
         points = carried(motions, true.links, true.rest_points_m)
-        # Targets on one link are displaced together; those on the floor stay.
-        bodies = np.where(true.links > 0, true.links, -1)
-        return self._repeatability.displaced(points, bodies, np.random.default_rng((self._seed, 1, self._visits)))
+        return self._displaced(points, true.links, np.random.default_rng((self._seed, 1, self._visits)))
+
+    def _displaced(self, points_m: Array, links: np.ndarray, rng: np.random.Generator) -> Array:
+        """Each link shifted and turned as a whole, about its first target; what stands on the floor stays."""
+        count, moved = self._cell.robot.joint_count + 1, points_m.copy()
+        shift = rng.normal(size=(count, 3)) * (self._repeatability.mean_translation_m / MEAN_LENGTH)
+        turn = rng.normal(size=(count, 3)) * (self._repeatability.mean_rotation_rad / MEAN_LENGTH)
+        for link in set(links.tolist()) - {0}:
+            own = links == link
+            moved[own] += shift[link] + np.cross(turn[link], points_m[own] - points_m[own][0])
+        return moved
 
 
 class DemoInstrument(PointMeter):

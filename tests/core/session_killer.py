@@ -1,0 +1,183 @@
+"""Writers that are killed at random moments, and what is left of their sessions.
+
+``python session_killer.py FOLDER ROUNDS SEED`` forks one writer after the other. Each opens the session, measures,
+judges, undoes, redoes, solves and exports, and tells every event through a pipe once it was taken. It is killed
+(SIGKILL) after a few milliseconds; then everything that it told has to be there. Prints a summary as JSON.
+"""
+
+import json
+import os
+import random
+import signal
+import sqlite3
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from core.campaign_files import read_campaign
+from core.instruments import MeasureRequest
+from core.session import Session
+from core.session_campaign import export_campaign
+from core.session_entries import encoded
+from core.session_events import Judged, SessionError, Solved
+from core.session_library import copy_session
+from core.session_shots import shot_at
+from core.twin import irb_l6
+from core.twin.demo import demo_events
+from core.twin.instrument import DemoInstrument, DemoRobot
+
+ROUNDS_A_FILE = 20
+LONGEST_LIFE_S = 0.06
+
+
+@dataclass
+class Summary:
+    """What happened in all rounds."""
+
+    rounds: int = 0
+    killed: int = 0
+    acknowledged: int = 0
+    kinds: dict[str, int] = field(default_factory=dict)
+    copies: int = 0
+    campaigns: int = 0
+    faults: list[str] = field(default_factory=list)
+
+
+def main() -> None:
+    """Run the rounds; always ends with status 0, the summary tells what is wrong."""
+    folder, rounds, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+    rng, summary = random.Random(seed), Summary()
+    known: dict[int, bytes] = {}
+    for number in range(rounds):
+        path = folder / f"{number // ROUNDS_A_FILE}.trueaxis"
+        if number % ROUNDS_A_FILE == 0:
+            Session.create(path, demo_events(irb_l6.cell()), by="killer").close()
+            known = _entries(path)
+        one_round(folder, path, number, rng, summary, known)
+    print(json.dumps(summary.__dict__))
+
+
+def one_round(folder: Path, path: Path, number: int, rng: random.Random, summary: Summary, known: dict) -> None:
+    """One writer's life and what it leaves."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reading)
+        try:
+            write(folder, path, number, random.Random(rng.random()), writing)
+        except BaseException as wrong:
+            os.write(writing, b"died: " + repr(wrong).encode() + b"\n")
+        finally:
+            os._exit(1)
+    os.close(writing)
+    time.sleep(rng.uniform(0.0005, LONGEST_LIFE_S))
+    os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    with os.fdopen(reading, "rb") as pipe:
+        told = pipe.read().split(b"\n")[:-1]
+    summary.rounds += 1
+    summary.killed += os.WIFSIGNALED(status)
+    examine(folder, path, number, told, summary, known)
+
+
+def write(folder: Path, path: Path, number: int, rng: random.Random, pipe: int) -> None:
+    """A writer's life: everything that an operator may do, at random, until the end."""
+    session = Session.open(path)
+    told = len(session.entries)
+    robot = DemoRobot(irb_l6.cell(), number)
+    meter = DemoInstrument(irb_l6.cell(), robot, number, told)
+    exported = 0
+    while True:
+        act(session, robot, meter, rng)
+        for entry in session.entries[told:]:
+            os.write(pipe, encoded(entry).hex().encode() + b"\n")
+        told = len(session.entries)
+        if rng.random() < 0.1 and any(shot.counts for shot in session.state.shots):
+            exported += 1
+            copy_session(path, folder / f"copy-{number}-{exported}.trueaxis")
+            export_campaign(session.state, folder / f"campaign-{number}-{exported}")
+        if rng.random() < 0.05:
+            session.close()
+            session = Session.open(path)
+
+
+def act(session: Session, robot: DemoRobot, meter: DemoInstrument, rng: random.Random) -> None:
+    """One thing that an operator does."""
+    state, dice = session.state, rng.random()
+    step = state.next_step
+    if dice < 0.15 and state.undo_next is not None and len(state.shots) > 2:
+        session.undo()
+    elif dice < 0.25 and state.undone:
+        session.redo()
+    elif dice < 0.35 and state.shots:
+        session.append(Judged((rng.choice(state.shots).id,), "excluded", "killed for it"))
+    elif dice < 0.4:
+        session.append(Solved("0" * 64, len(state.shots), "test", {"noise_mm": 0.2}))
+    else:
+        step = step or rng.choice(state.steps)
+        robot.move_to(step.commanded, lambda: False)
+        session.append(shot_at(step, meter.measure(MeasureRequest(step.target, step.commanded), lambda: False)))
+
+
+def examine(folder: Path, path: Path, number: int, told: list[bytes], summary: Summary, known: dict) -> None:
+    """Whether everything that was told is there, the file is sound, and the session goes on where it stood."""
+    acknowledged = {}
+    for line in told:
+        if line.startswith(b"died"):
+            summary.faults.append(f"round {number}: {line.decode()}")
+            continue
+        data = bytes.fromhex(line.decode())
+        acknowledged[json.loads(data)["seq"]] = data
+    found = _entries(path)
+    for seq, data in (known | acknowledged).items():
+        if found.get(seq) != data:
+            summary.faults.append(f"round {number}: event {seq} was acknowledged and is not there")
+    known.clear()
+    known.update(found)
+    summary.acknowledged += len(acknowledged)
+    with Session.open(path) as session:
+        if session.read_only or session.state.warnings:
+            summary.faults.append(f"round {number}: {session.why_read_only} {session.state.warnings}")
+        for entry in session.entries:
+            summary.kinds[entry.kind] = summary.kinds.get(entry.kind, 0) + (entry.seq in acknowledged)
+        _check_same_step(path, session, number, summary)
+    known.update(_entries(path))
+    connection = sqlite3.connect(path)
+    if connection.execute("PRAGMA integrity_check").fetchone() != ("ok",):
+        summary.faults.append(f"round {number}: SQLite finds the file damaged")
+    connection.close()
+    _examine_exports(folder, number, summary)
+
+
+def _check_same_step(path: Path, session: Session, number: int, summary: Summary) -> None:
+    """Read anew, the session stands at the same step with the same shots."""
+    with Session.open(path, read_only=True) as other:
+        same = other.state.position == session.state.position and other.state.shots == session.state.shots
+    if not same:
+        summary.faults.append(f"round {number}: another reader sees another state")
+
+
+def _examine_exports(folder: Path, number: int, summary: Summary) -> None:
+    for copy in folder.glob(f"copy-{number}-*.trueaxis"):
+        try:
+            with Session.open(copy, read_only=True) as session:
+                summary.copies += 1
+                if session.state.warnings:
+                    summary.faults.append(f"{copy.name}: {session.state.warnings}")
+        except SessionError as wrong:
+            summary.faults.append(f"{copy.name}: {wrong}")
+    for campaign in folder.glob(f"campaign-{number}-*"):
+        if (campaign / "campaign.toml").exists():
+            read_campaign(campaign)
+            summary.campaigns += 1
+
+
+def _entries(path: Path) -> dict[int, bytes]:
+    """Every row of a session file as it is read by a program of its own kind, without opening it for writing."""
+    with Session.open(path, read_only=True) as session:
+        return {entry.seq: encoded(entry) for entry in session.entries}
+
+
+if __name__ == "__main__":
+    main()
