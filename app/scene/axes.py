@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from app.scene.colours import FITTED_AXIS, HIGHLIGHT, NOMINAL_AXIS, Rgb
+from app.scene.colours import FITTED_AXIS, HIGHLIGHT, NOMINAL_AXIS, Rgb, round_down
 from app.scene.poses import link_motions, pose_of, together
 from app.scene.solids import Solid, arrow, lathe
 from core.geometry import Array, Line
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     import viser
 
 TUBE_OPACITY = 0.28
+LENGTH_OF_REACH = 0.8
+"""A good length of arrows, as a share of an arm's reach: long enough for all tips to stand clear of the arm."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,16 @@ def uncertainty_tube(mark: AxisMark, length_m: float, exaggeration: float, least
     ways = ways[(ways >= low - 1e-12) & (ways <= high + 1e-12)]
     radius = np.maximum(tube_radius_m(mark, ways, exaggeration), least_m)
     return lathe(mark.line.point_m, mark.line.direction, np.stack([ways, radius], axis=1), 16)
+
+
+def tube_exaggeration(marks: tuple[AxisMark, ...], length_m: float, widest_m: float) -> float:
+    """A round factor that makes no tube wider than a radius, at least 1; 1 where no uncertainty is known."""
+    widest = [
+        tube_radius_m(mark, (np.stack(axis_ends(mark, length_m)) - mark.line.point_m) @ mark.line.direction, 1.0).max()
+        for mark in marks
+        if np.isfinite(mark.direction_std_rad)
+    ]
+    return max(round_down(widest_m / max([*widest, 1e-12])), 1.0) if widest else 1.0
 
 
 class AxesView:

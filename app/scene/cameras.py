@@ -46,14 +46,16 @@ def presets(
     motions = link_motions(bones.axes, bones.sliding, net)
     joints = np.stack([apply(motions[i], hub) for i, hub in enumerate(bones.hubs_m)])
     tool = apply(motions[-1], bones.tool_m)
-    arm = np.vstack([bones.base_m, joints, tool])
+    # Links and levers stand out from the skeleton, and labels from them.
+    thick = 0.11 * bones.reach_m
+    arm = np.vstack([p + sign * thick for p in (bones.base_m, joints, tool) for sign in (-1, 1)])
     spots = [station.position_m for station in stations]
     feet = [np.array([p[0], p[1], p[2] if floor_m is None else floor_m]) for p in spots]
     side = viewing_direction(joints, tool, spots)
-    close = 0.42 * bones.reach_m
+    close = 0.32 * bones.reach_m
     return (
-        around("All", np.vstack([arm, *spots, *feet]), side + 0.25 * UP),
-        around("Arm", arm, side),
+        around("All", np.vstack([arm, *spots, *feet]), side + 0.25 * UP, 1.2),
+        around("Arm", arm, side, 1.2),
         *(near(f"Joint {k}", point, side, close) for k, point in enumerate(joints, 1)),
         near("Tool", tool, side, close),
         *(through(station, arm) for station in stations if np.linalg.norm(arm.mean(axis=0) - station.position_m) > 0.2),
@@ -73,7 +75,7 @@ def viewing_direction(joints_m: Array, tool_m: Array, stations_m: list[Array]) -
     return direction / np.linalg.norm(direction)
 
 
-def around(name: str, points_m: Array, direction: Array, margin: float = 1.12) -> Camera:
+def around(name: str, points_m: Array, direction: Array, margin: float = 1.0) -> Camera:
     """A view from a direction that holds all points, (m, 3)."""
     away = direction / np.linalg.norm(direction)
     middle = (points_m.min(axis=0) + points_m.max(axis=0)) / 2

@@ -17,7 +17,6 @@ SKY: Rgb = (86, 180, 233)
 GREEN: Rgb = (0, 158, 115)
 BLUE: Rgb = (0, 114, 178)
 VERMILLION: Rgb = (213, 94, 0)
-PURPLE: Rgb = (204, 121, 167)
 GREY: Rgb = (140, 146, 155)
 
 ARM: Rgb = (168, 176, 188)
@@ -26,9 +25,10 @@ GHOST: Rgb = SKY
 """The nominal arm."""
 FITTED_AXIS: Rgb = GREEN
 NOMINAL_AXIS: Rgb = GREY
-HIGHLIGHT: Rgb = ORANGE
+HIGHLIGHT: Rgb = (217, 30, 140)
+"""What is being done now: magenta, which no other thing has; always with a shape of its own as well."""
 EXCLUDED: Rgb = GREY
-ERROR_VECTOR: Rgb = PURPLE
+ERROR_VECTOR: Rgb = (150, 110, 230)
 SIGHT_LINE: Rgb = SKY
 INSTRUMENT: Rgb = ORANGE
 FLOOR: Rgb = (128, 132, 138)
@@ -70,14 +70,14 @@ class ResidualScale:
 
     @classmethod
     def over(cls, residual_m: ArrayLike) -> "ResidualScale":
-        """A scale with a round limit (1, 2 or 5 times a power of ten) that holds 95 of 100 residuals.
+        """A scale with a round limit (1, 2 or 5 times a power of ten) that holds nine of ten residuals.
 
         Args:
             residual_m: any shape; NaN is left out; without any finite residual the limit is 0.1 mm.
         """
         size = np.abs(np.asarray(residual_m, dtype=float)).ravel()
         size = size[np.isfinite(size)]
-        top = float(np.quantile(size, 0.95)) if len(size) else 0.0
+        top = float(np.quantile(size, 0.9)) if len(size) else 0.0
         return cls(round_up(top) if top > 1e-9 else 1e-4)
 
     def colours(self, residual_m: ArrayLike) -> Bytes:
@@ -100,6 +100,13 @@ class ResidualScale:
         sign = "\N{MINUS SIGN}" if share < 0 else "+" if share > 0 else ""
         bound = {-1.0: "\N{LESS-THAN OR EQUAL TO} ", 1.0: "\N{GREATER-THAN OR EQUAL TO} "}.get(share, "")
         return f"{bound}{sign}{abs(value):.{decimals}f} mm"
+
+
+def round_down(value: float) -> float:
+    """The last number that is 1, 2 or 5 times a power of ten, for a value above 0."""
+    power = 10.0 ** np.floor(np.log10(value))
+    step = next(s for s in (10.0, 5.0, 2.0, 1.0) if s * power <= value * (1 + 1e-9))
+    return float(step * power)
 
 
 def round_up(value: float) -> float:

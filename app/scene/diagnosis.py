@@ -3,10 +3,9 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from app.scene.cameras import Camera, near
-from app.scene.colours import FITTED_AXIS, GREY, HIGHLIGHT, NOMINAL_AXIS, VERMILLION, Rgb
+from app.scene.colours import BLUE, FITTED_AXIS, GREY, HIGHLIGHT, NOMINAL_AXIS, VERMILLION, Rgb
 from app.scene.dimensions import Dimension, FrameSketch, dimensions, sketches
 from app.scene.error_vectors import factor_text
 from app.scene.poses import together
@@ -95,7 +94,7 @@ class DiagnosisView:
             self._draw_dimensions()
             top = max(p.to_m[2] for p in self.dimensions) if self.dimensions else self._models[2][2, 3]
             middle = np.mean([s.phi_frame[:3, 3] for s in drawn], axis=0)
-            place = (middle[0], middle[1], top + 0.3 * self._reach)
+            place = (middle[0], middle[1], top + 0.16 * self._reach)
             text = f"differences {factor_text(self._exaggeration)}"
             self._scene.add_label(f"{self._root}/factor", text, position=place, anchor="bottom-center")
 
@@ -114,13 +113,14 @@ class DiagnosisView:
         )
 
     def _phi_frames(self, drawn: list[FrameSketch]) -> None:
-        turns = Rotation.from_matrix([s.phi_frame[:3, :3] for s in drawn]).as_quat(scalar_first=True)
-        self._scene.add_batched_axes(
-            f"{self._root}/phi_frames",
-            turns,
-            np.array([s.phi_frame[:3, 3] for s in drawn]),
-            axes_length=0.06 * self._reach,
-            axes_radius=0.0025 * self._reach,
+        """X and Y short and grey, Z_phi longer and blue."""
+        sizes = 0.06 * self._reach * np.array([0.6, 0.6, 1.5])
+        ends = [
+            (f[:3, 3], f[:3, 3] + size * f[:3, k]) for f in (s.phi_frame for s in drawn) for k, size in enumerate(sizes)
+        ]
+        colours = np.tile(np.array([GREY, GREY, BLUE], dtype=np.uint8)[:, None], (len(drawn), 2, 1))
+        self._scene.add_line_segments(
+            f"{self._root}/phi_frames", np.array(ends), colours, thickness=3.0, thickness_units="screen"
         )
 
     def _draw_dimensions(self) -> None:
@@ -130,7 +130,7 @@ class DiagnosisView:
             key = (d.frame, d.parameter)
             lit = key == self._lit
             name = f"dimensions/{d.frame}_{d.parameter}"
-            self._mesh(name, self._leg(d, lit), HIGHLIGHT if lit else VERMILLION if d.significant else GREY)
+            self._mesh(name, self._leg(d, lit), self._colour(d, lit))
             shown = lit or (d.significant and self._lit is None)
             self._labels[key] = self._label(f"{name}/label", d.text, place, shown)
             leaders += [[d.middle_m, place]] if shown else []
@@ -138,6 +138,11 @@ class DiagnosisView:
         self._scene.add_line_segments(
             f"{self._root}/leaders", ends, GREY, thickness=1.0, thickness_units="screen", visible=bool(leaders)
         )
+
+    def _colour(self, dimension: Dimension, lit: bool) -> Rgb:
+        if lit:
+            return HIGHLIGHT
+        return VERMILLION if dimension.significant and self._lit is None else GREY
 
     def _leg(self, dimension: Dimension, lit: bool) -> Solid:
         radius = (0.0055 if lit else 0.0035) * self._reach
@@ -167,7 +172,9 @@ def label_places(drawn: tuple[Dimension, ...], height_m: float, width_m: float) 
     """
     if not drawn:
         return np.zeros((0, 3))
+    # A little above, so that a label does not cover what it speaks of.
     places = np.array([d.middle_m for d in drawn])
+    places[:, 2] += 0.8 * height_m
     shown = np.array([d.significant for d in drawn])
     apart = np.linalg.norm(places[:, None, :2] - places[None, :, :2], axis=2)
     rivals = (apart < width_m) & shown[:, None] & shown[None]

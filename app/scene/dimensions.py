@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.scene.colours import round_down
 from core.estimate import Geometry
 from core.findings import SIGNIFICANT
 from core.geometry import Array, Line
@@ -127,9 +128,7 @@ def fitting_exaggeration(nominal: PhiModel, geometry: Geometry, reach_m: float) 
     """
     size = np.where(geometry.std > 0, np.abs(geometry.model.parameters - nominal.parameters), 0.0)
     largest = max(size[:, :2].max() / (0.18 * reach_m), size[:, 2:].max() / np.deg2rad(35.0), 1e-6)
-    power = 10.0 ** np.floor(np.log10(1.0 / largest))
-    step = next(s for s in (5.0, 2.0, 1.0) if s * power * largest <= 1.0 + 1e-9)
-    return float(max(step * power, 1.0))
+    return max(round_down(1.0 / largest), 1.0)
 
 
 def _exaggerated(deviation: Array, exaggeration: float) -> Array:

@@ -30,7 +30,7 @@ def magnified_ends(measured_m: ArrayLike, predicted_m: ArrayLike, magnification:
 
 def arrows(ends_m: Array, radius_m: float = 0.0028) -> Solid:
     """Arrows (k, 2, 3) as one solid; those of no length are left out."""
-    return merged([arrow(start, end, radius_m, 8) for start, end in ends_m])
+    return merged([arrow(start, end, radius_m, 6) for start, end in ends_m])
 
 
 def factor_text(magnification: float) -> str:

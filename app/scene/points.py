@@ -69,7 +69,7 @@ class PointsView:
         self._top = scene.add_frame(root, show_axes=False)
         self._on_click: OnClick | None = None
         self._solids = {
-            Verdict.KEPT: ball(np.zeros(3), radius_m, 12),
+            Verdict.KEPT: ball(np.zeros(3), radius_m, 8),
             Verdict.DOUBTFUL: octahedron(1.7 * radius_m),
             Verdict.EXCLUDED: cage(1.15 * radius_m),
         }
@@ -142,13 +142,13 @@ class PointsView:
                 call(int(rows[index]), event.client_id)
 
     def _halo(self) -> "viser.MeshHandle":
-        solid = merged([ring(np.zeros(3), axis, 2.1 * self._radius, 0.3 * self._radius) for axis in np.eye(3)])
+        solid = merged([ring(np.zeros(3), axis, 2.4 * self._radius, 0.4 * self._radius) for axis in np.eye(3)])
         return self._mark("last", solid, None)
 
     def _ghost(self) -> "viser.FrameHandle":
         node = self._scene.add_frame(f"{self._root}/next", show_axes=False, visible=False)
-        self._mark("next/ring", ring(np.zeros(3), [0.0, 0.0, 1.0], 3.6 * self._radius, 0.45 * self._radius), None)
-        self._mark("next/ball", ball(np.zeros(3), 1.2 * self._radius), 0.45)
+        self._mark("next/ring", ring(np.zeros(3), [0.0, 0.0, 1.0], 4.5 * self._radius, 0.6 * self._radius), None)
+        self._mark("next/ball", ball(np.zeros(3), 1.3 * self._radius), 0.5)
         return node
 
     def _mark(self, part: str, solid: Solid, opacity: float | None) -> "viser.MeshHandle":

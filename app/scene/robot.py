@@ -123,7 +123,7 @@ class RobotView:
     def _draw_links(self, colour: Rgb, swell_m: float) -> None:
         for k, shape in enumerate(link_shapes(self.bones, swell_m)):
             self._add(f"{self.link_node(k)}/body", shape.body.about(self._origins[k]), colour)
-            self._add(f"{self.link_node(k)}/joint", shape.joint.about(self._origins[k]), shaded(colour, 0.55))
+            self._add(f"{self.link_node(k)}/joint", shape.joint.about(self._origins[k]), shaded(colour, 0.6))
 
     def _draw_linkages(self, colour: Rgb) -> None:
         for linkage in self.linkages:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from core.geometry import Array, cross, perpendicular_basis
 
-SEGMENTS = 20
+SEGMENTS = 18
 """Of a full turn: round enough at the size of an arm on a screen, and light to draw."""
 
 
@@ -61,16 +61,20 @@ def lathe(start_m: ArrayLike, direction: ArrayLike, profile: ArrayLike, segments
     circle = np.cos(angle)[:, None] * e1 + np.sin(angle)[:, None] * e2
     centres = np.asarray(start_m, dtype=float) + along[:, None] * np.asarray(direction, dtype=float)
     vertices = (centres[:, None] + radius[:, None, None] * circle).reshape(-1, 3)
-    return Solid(vertices, _strips(len(along), segments))
+    return Solid(vertices, _strips(along, radius, segments))
 
 
-def _strips(rings: int, segments: int) -> np.ndarray:
-    """Triangles between consecutive rings of equally many vertices."""
+def _strips(along: Array, radius: Array, segments: int) -> np.ndarray:
+    """Triangles between consecutive rings of equally many vertices, without those that have no area."""
     here = np.arange(segments)
     beside = (here + 1) % segments
-    low = (np.arange(rings - 1) * segments)[:, None]
+    rings = np.arange(len(along) - 1)
+    apart = (np.diff(along) != 0) | (np.diff(radius) != 0)
+    low = (rings * segments)[:, None]
     a, b, c, d = low + here, low + beside, low + segments + here, low + segments + beside
-    return np.concatenate([np.stack([a, b, d], axis=-1), np.stack([a, d, c], axis=-1)]).reshape(-1, 3)
+    from_wide, to_wide = (radius[:-1] > 1e-12) & apart, (radius[1:] > 1e-12) & apart
+    first, second = np.stack(np.broadcast_arrays(a, b, d), axis=-1), np.stack(np.broadcast_arrays(a, d, c), axis=-1)
+    return np.concatenate([first[from_wide], second[to_wide]]).reshape(-1, 3)
 
 
 def tube(
@@ -124,7 +128,7 @@ def octahedron(radius_m: float) -> Solid:
 
 def ring(centre_m: ArrayLike, normal: ArrayLike, radius_m: float, thickness_m: float, segments: int = 28) -> Solid:
     """A torus about a centre."""
-    angle = np.linspace(0.0, 2 * np.pi, 9)
+    angle = np.linspace(0.0, 2 * np.pi, 7)
     profile = np.stack([thickness_m / 2 * np.sin(angle), radius_m + thickness_m / 2 * np.cos(angle)], axis=1)
     return lathe(centre_m, normal, profile, segments)
 
