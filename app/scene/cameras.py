@@ -55,7 +55,7 @@ def presets(
     close = 0.32 * bones.reach_m
     return (
         around("All", np.vstack([arm, *spots, *feet]), side + 0.25 * UP, 1.2),
-        around("Arm", arm, side, 1.2),
+        around("Arm", arm, side, 1.3),
         *(near(f"Joint {k}", point, side, close) for k, point in enumerate(joints, 1)),
         near("Tool", tool, side, close),
         *(through(station, arm) for station in stations if np.linalg.norm(arm.mean(axis=0) - station.position_m) > 0.2),

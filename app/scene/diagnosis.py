@@ -124,7 +124,7 @@ class DiagnosisView:
         )
 
     def _draw_dimensions(self) -> None:
-        places = label_places(self.dimensions, 0.075 * self._reach, 0.45 * self._reach)
+        places = label_places(self.dimensions, 0.1 * self._reach, 0.45 * self._reach)
         leaders = []
         for d, place in zip(self.dimensions, places, strict=True):
             key = (d.frame, d.parameter)
