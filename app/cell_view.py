@@ -72,6 +72,11 @@ class CellView:
         self.points.show(PointMarks(np.arange(len(shots)), points, colours, verdicts))
         self.points.mark_last(points[-1] if len(points) else None)
         self.stations.aim(points[-1] if len(points) else None)
+        expected = self._bench.expected()
+        if expected is None:
+            self.points.expect(None)
+        else:
+            self.points.expect(*expected)
 
     def show_calibration(self, found: Calibration) -> None:
         """Show the fitted axes with their uncertainty, the nominal arm as a ghost, and the residuals."""
@@ -89,11 +94,7 @@ def axis_marks(estimate: ArmEstimate) -> tuple[AxisMark, ...]:
     marks = []
     for joint, line in enumerate(estimate.arm.axes, 1):
         direction_std, place_std = estimate.axis_std(joint)
-        marks.append(
-            AxisMark(
-                joint=joint, line=line, middle_m=line.point_m, direction_std_rad=direction_std, point_std_m=place_std
-            )
-        )
+        marks.append(AxisMark(joint, line, line.point_m, direction_std, place_std, text=f"axis {joint}"))
     return tuple(marks)
 
 

@@ -26,6 +26,8 @@ from app.words import STYLE
 from app.workbench import Workbench
 from core.errors import InputError
 
+THEME = {"show_logo": False, "show_share_button": False, "brand_color": (0, 114, 178)}
+
 
 class Dashboard:
     """A running dashboard on one session."""
@@ -40,7 +42,7 @@ class Dashboard:
         self.server = _server(host, port)
         self.host, self.port = host, self.server.get_port()
         gui = self.server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
+        gui.configure_theme(**THEME)
         self.seat = Seat(self.server)
         self.cell = CellView(self.server.scene, bench)
         self._look_at_the_cell()
@@ -58,7 +60,7 @@ class Dashboard:
         with tabs.add_tab("4 Export"):
             self.export = ExportPanel(gui, bench, self.ask)
         with tabs.add_tab("View"):
-            self.view = ViewPanel(gui, self.cell, self.server)
+            self.view = ViewPanel(gui, self.cell, self._darken)
         self.results = ResultsPanel(gui, bench)
         self.cell.points.on_click(self._clicked)
         bench.on_change(self.refresh)
@@ -98,6 +100,10 @@ class Dashboard:
         self.jobs.close()
         self.server.stop()
         self.bench.session.close()
+
+    def _darken(self, dark: bool) -> None:
+        self.server.gui.configure_theme(dark_mode=dark, **THEME)
+        self.results.show_dark(dark)
 
     def _look_at_the_cell(self) -> None:
         """What a browser sees first: the arm, with its instruments behind."""

@@ -17,7 +17,7 @@ from core.calibration_json import calibration_to_json
 from core.geometry import Array
 from core.instruments import Desk, MeasureRequest, Reading
 from core.kinematics import nominal_net
-from core.live_sweep import LiveSweep, live_sweep
+from core.live_sweep import LiveSweep, expected_point, live_sweep
 from core.session import Session
 from core.session_campaign import to_campaign
 from core.session_events import Failed, Judged, SessionError, ShotTaken, Skipped, Solved, WentTo
@@ -208,6 +208,18 @@ class Workbench:
         target = np.unique(names, return_inverse=True)[1] if names else None
         sliding = bool(self.cell.robot.sliding[joint - 1])
         return live_sweep(points, command, sliding=sliding, target=target, covariance_m2=_covariances(shots)), shots
+
+    def expected(self) -> tuple[Array, Array] | None:
+        """About where the target of the next shot will be, (3,), and the axis it turns about; None: not known yet."""
+        step = self.state.next_step
+        if step is None:
+            return None
+        live, shots = self.live(step.joint, step.sweep)
+        last = next((s for s in reversed(shots) if s.taken.target == step.target), None)
+        if live.fit is None or last is None:
+            return None
+        way = step.commanded[step.joint - 1] - last.taken.commanded[step.joint - 1]
+        return expected_point(live.fit, last.taken.point_m, way), live.fit.line.direction
 
     def nominal_net(self, commanded: tuple[float, ...] | Array) -> Array:
         """Net displacements from the marks that the nominal arm believes in, (n,)."""

@@ -38,6 +38,24 @@ CONFIG = {
 """For ``Plotly.newPlot``."""
 
 
+DARK_PAPER, DARK_INK, DARK_GRID = "#1f1f1f", "#d6d6d6", "#3c3f44"
+
+
+def in_theme(figure: go.Figure, dark: bool) -> go.Figure:
+    """A figure for a page with a dark theme, changed in place; a light one is left as it is."""
+    if dark:
+        figure.update_layout(paper_bgcolor=DARK_PAPER, plot_bgcolor=DARK_PAPER, font_color=DARK_INK)
+        figure.update_xaxes(gridcolor=DARK_GRID, linecolor=DARK_INK, zerolinecolor=DARK_INK)
+        figure.update_yaxes(gridcolor=DARK_GRID, linecolor=DARK_INK, zerolinecolor=DARK_INK)
+        figure.for_each_trace(lambda trace: trace.update(line_color=DARK_INK), _is_ink)
+    return figure
+
+
+def _is_ink(trace: go.Scatter) -> bool:
+    """Whether a trace is drawn in the colour of the text."""
+    return trace.mode is not None and "lines" in trace.mode and trace.line.color == BLACK
+
+
 def plain(text: str, longest: int = 24) -> str:
     """Text from a file, cut if it is long, to be shown as it is: plotly reads a little HTML in its labels."""
     short = text if len(text) <= longest else f"{text[: longest - 1]}…"

@@ -9,7 +9,7 @@ import viser
 from app.figures.deviations import deviations_figure
 from app.figures.live import live_figure
 from app.figures.residuals import residual_figure
-from app.figures.style import CONFIG
+from app.figures.style import CONFIG, in_theme
 from app.figures.transmissions import transmission_figure
 from app.words import block
 from app.workbench import Workbench
@@ -27,6 +27,7 @@ class ResultsPanel:
         self._bench = bench
         self.drawn: Calibration | None = None
         self._live_key: tuple = ()
+        self._dark = False
         panel = gui.add_panel()
         with panel.add_tab("This sweep"):
             self._live = _plot(gui, _empty("Nothing is measured yet"))
@@ -46,6 +47,11 @@ class ResultsPanel:
         panel.dock_right()
         panel.set_width(540)
 
+    def show_dark(self, dark: bool) -> None:
+        """Draw everything anew for a dark or a light page."""
+        self._dark, self._live_key, self.drawn = dark, (), None
+        self.refresh()
+
     def refresh(self) -> None:
         """Draw what has changed."""
         self._draw_live()
@@ -60,9 +66,7 @@ class ResultsPanel:
         self._draw_sweep()
         self._draw_joint()
         figure = deviations_figure(found)
-        self._deviations.figure = (
-            figure if figure is not None else _empty("Solve every joint to compare with the design")
-        )
+        self._show(self._deviations, figure or _empty("Solve every joint to compare with the design"))
         self._table.content = table_2(found)
 
     def _draw_live(self) -> None:
@@ -75,19 +79,23 @@ class ResultsPanel:
         joint = last.taken.joint
         live, shots = self._bench.live(joint, last.taken.sweep)
         command = np.array([s.taken.commanded[joint - 1] for s in shots])
-        self._live.figure = live_figure(live, command, joint, bool(self._bench.cell.robot.sliding[joint - 1]), WIDTH_PX)
+        sliding = bool(self._bench.cell.robot.sliding[joint - 1])
+        self._show(self._live, live_figure(live, command, joint, sliding, WIDTH_PX))
 
     def _draw_sweep(self) -> None:
         found = self.drawn
         if found is not None:
             names = [f.sweep.name for f in found.found.fits]
             if self._sweep.value in names:
-                self._residuals.figure = residual_figure(found, names.index(self._sweep.value))
+                self._show(self._residuals, residual_figure(found, names.index(self._sweep.value)))
 
     def _draw_joint(self) -> None:
         found = self.drawn
         if found is not None and self._joint.value in {str(j) for j in found.found.swept}:
-            self._drive.figure = transmission_figure(found, int(self._joint.value))
+            self._show(self._drive, transmission_figure(found, int(self._joint.value)))
+
+    def _show(self, plot: viser.GuiPlotlyHandle, figure: go.Figure) -> None:
+        plot.figure = in_theme(figure, self._dark)
 
 
 def table_2(found: "Calibration") -> str:

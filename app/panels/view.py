@@ -1,5 +1,6 @@
 """What is shown in 3-D, and from where."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from app.cell_view import CellView
@@ -15,8 +16,8 @@ MAGNIFICATIONS = ("50", "100", "200", "500", "1000")
 class ViewPanel:
     """Switches, magnification, cameras, and the keys."""
 
-    def __init__(self, gui: "viser.GuiApi", cell: CellView, server: "viser.ViserServer") -> None:
-        self._cell, self._server = cell, server
+    def __init__(self, gui: "viser.GuiApi", cell: CellView, on_dark: Callable[[bool], None]) -> None:
+        self._cell = cell
         names = tuple(camera.name for camera in cell.cameras())
         self._camera = gui.add_dropdown("Look at", names, initial_value=names[0])
         self._camera.on_update(self._fly)
@@ -27,11 +28,7 @@ class ViewPanel:
         self._times = gui.add_dropdown("Residuals magnified", MAGNIFICATIONS, initial_value="200")
         self._times.on_update(self._magnify)
         self._dark = gui.add_checkbox("Dark theme", False)
-        self._dark.on_update(
-            lambda _: gui.configure_theme(
-                dark_mode=bool(self._dark.value), show_logo=False, show_share_button=False, brand_color=(0, 114, 178)
-            )
-        )
+        self._dark.on_update(lambda _: on_dark(bool(self._dark.value)))
         keys = (
             ("Space", "Measure the next shot"),
             ("R", "Measure the chosen shot again"),
