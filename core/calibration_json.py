@@ -12,6 +12,7 @@ from core.findings import Finding
 from core.geometry import Array
 from core.json_values import Json, degrees, json_text, mm, named, number, numbers, root_mean_square, transform_mm
 from core.motion_json import coupling_records, transmission_records
+from core.robot_json import robot_record
 from core.sweep_fits import SweepFit
 from core.version import VERSION
 from core.wording import joint_list, parameter_unit
@@ -46,6 +47,7 @@ def calibration_to_json(calibration: Calibration) -> str:
             "not_swept": list(calibration.not_swept),
             "not_moved": list(calibration.not_moved),
             "notes": _notes(calibration),
+            "nominal_robot": robot_record(calibration.campaign.robot),
         }
     )
 

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from core.driven_robot import DrivenRobot
 from core.geometry import Array
 from core.pose_iteration import chain_state
+from core.rotations import quaternions
 
 TABLE_SIZE = 60_000
 
@@ -97,30 +98,6 @@ def joint_distance(first: Array, second: Array, sliding: np.ndarray, reach_m: fl
     apart = first - second
     turned = np.abs((apart + np.pi) % (2 * np.pi) - np.pi)
     return np.max(np.where(sliding, np.abs(apart) / reach_m, turned), axis=-1, initial=0.0)
-
-
-def quaternions(rotation: Array) -> Array:
-    """Unit quaternions w x y z of rotations (m, 3, 3), (m, 4); of q and -q either one.
-
-    Of the four ways to write them the one with the largest divisor is taken (Shepperd 1978, doi 10.2514/3.55767b).
-    """
-    trace = np.trace(rotation, axis1=1, axis2=2)
-    diagonal = np.diagonal(rotation, axis1=1, axis2=2)
-    squares = np.concatenate([(1 + trace)[:, None], 1 + 2 * diagonal - trace[:, None]], axis=1)
-    largest = np.argmax(squares, axis=1)
-    out = np.empty((len(rotation), 4))
-    r = np.moveaxis(rotation, 0, -1)
-    products = np.array(
-        [
-            [squares[:, 0], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
-            [r[2, 1] - r[1, 2], squares[:, 1], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
-            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], squares[:, 2], r[1, 2] + r[2, 1]],
-            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[:, 3]],
-        ]
-    )
-    rows = np.arange(len(rotation))
-    out[:] = products[largest, :, rows]
-    return out / np.linalg.norm(out, axis=1, keepdims=True)
 
 
 def _keys(place: Array, rotations: Array) -> Array:

@@ -53,6 +53,10 @@ class TextTable:
         """The error for a row, by row index."""
         return CampaignError(f"{self.path}, row {self.lines[row]}, {message}")
 
+    def header_wrong(self, message: str) -> CampaignError:
+        """The error for the header."""
+        return CampaignError(f"{self.path}, row 1: {message}")
+
     def check(self, column: str, wrong: np.ndarray, expected: str) -> None:
         """Refuse the first cell of a column for which ``wrong`` (boolean, one a row) is true."""
         if wrong.any():
@@ -107,8 +111,11 @@ class TextTable:
         return values
 
 
-def read_text_table(path: Path) -> tuple[TextTable, bytes]:
+def read_text_table(path: Path, thing: str = "a measured point") -> tuple[TextTable, bytes]:
     """A CSV file with a header, and its bytes.
+
+    Args:
+        thing: what a row stands for, for messages.
 
     Raises:
         CampaignError: missing, empty, too large, not UTF-8, a column twice, a ragged row, or no row at all.
@@ -125,7 +132,7 @@ def read_text_table(path: Path) -> tuple[TextTable, bytes]:
         told = " ".join(str(wrong).split())
         raise CampaignError(f"{path}, row {reader.line_num}: {told}, expected plain CSV") from None
     if not lines:
-        raise CampaignError(f"{path} has a header and no rows, expected one row a measured point")
+        raise CampaignError(f"{path} has a header and no rows, expected one row for {thing}")
     return TextTable(path, dict(zip(header, columns, strict=True)), lines), source.data
 
 

@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 
 FOUNDATION = """
-    core.version core.errors core.geometry
+    core.version core.errors core.geometry core.rotations
     core.phi_transforms core.phi_convention core.phi_model
     core.robot core.kinematics core.measurements
 """
@@ -28,11 +28,14 @@ CALIBRATION = """
     core.live_sweep core.findings core.calibration
 """
 RESULTS = """
-    core.wording core.report core.json_values core.axis_json core.motion_json core.calibration_json
+    core.wording core.report core.json_values core.json_records core.robot_json
+    core.axis_json core.motion_json core.calibration_json
     core.twin
 """
 USE = """
     core.driven_robot core.pose_iteration core.pose_seeds core.inverse_kinematics
+    core.calibrated_arm core.calibration_file core.pose_files core.compensation
+    core.rigid_pose core.standstills core.end_effector core.verification core.repeatability core.verification_json
 """
 APP = """
     app.paths app.progress app.output app.standard_output app.summary

@@ -20,7 +20,6 @@ from core.inverse_kinematics import (
 )
 from core.kinematics import forward, joint_jacobian, nominal_net
 from core.pose_iteration import approach, chain_state, misfits, rotation_vectors, scaled_jacobian
-from core.pose_seeds import quaternions
 from core.robot import Coupling, Joint, JointKind, Robot
 from core.robot_builders import DhRow, robot_from_dh, robot_from_phi
 from core.twin.irb_l6_arm import nominal_robot, true_arm
@@ -257,15 +256,6 @@ def test_rotation_vectors_are_exact_at_every_angle(angle: float) -> None:
         vector = rotation_vectors(rotation_about(axis, angle)[:, :, None])[:, 0]
         sign = np.sign(vector @ axis) if angle > 3.1 else 1.0
         np.testing.assert_allclose(vector * sign, axis * angle, rtol=0, atol=3e-8)
-
-
-def test_quaternions_turn_vectors_as_the_rotations_do() -> None:
-    rotations = np.stack([random_motion(RNG(k))[:3, :3] for k in range(200)] + [np.diag([1.0, -1.0, -1.0])])
-    q = quaternions(rotations)
-    w, v = q[:, 0], q[:, 1:]
-    x = RNG(0).normal(size=3)
-    turned_x = x + 2 * np.cross(v, np.cross(v, x) + w[:, None] * x)
-    np.testing.assert_allclose(turned_x, rotations @ x, rtol=0, atol=1e-12)
 
 
 def test_a_bent_step_ends_where_straight_ones_take_long() -> None:
