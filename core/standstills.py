@@ -1,0 +1,73 @@
+"""The pose records of a campaign, standstill by standstill: commands, and points of the targets on the last link."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.errors import CampaignError
+from core.geometry import Array
+from core.measurements import POSE, Campaign
+from core.rigid_pose import PointSets
+
+SAME_COMMAND = 1e-9
+"""Commands that differ by less are one, rad or m."""
+
+
+@dataclass(frozen=True)
+class Standstills:
+    """What was seen of the last link, one row a standstill."""
+
+    pose: np.ndarray
+    """Index of the pose in the campaign, ascending, (k,)."""
+    commanded: Array
+    """(k, n)."""
+    target: np.ndarray
+    """Which of the campaign's targets are on the last link and were seen, (j,)."""
+    points: PointSets
+    """Their points, repeated shots averaged, (k, j)."""
+
+
+def standstills(campaign: Campaign, noise_m: float) -> Standstills:
+    """The pose records of the targets on the last link.
+
+    Args:
+        campaign: its pose records are used whatever ``use`` says: a calibration fits sweeps only.
+        noise_m: standard deviation of one coordinate of a point that states no covariance.
+
+    Raises:
+        CampaignError: no such record, or two different commands in one standstill.
+    """
+    table, n = campaign.measurements, campaign.robot.joint_count
+    last = np.array([target.link == n for target in campaign.targets])
+    if not last.any():
+        raise CampaignError(f"no target rides on link {n}, the last one: there is nothing to verify the arm's poses by")
+    rows = np.flatnonzero((table.phase == POSE) & table.seen & (table.target >= 0))
+    rows = rows[last[table.target[rows]]]
+    if len(rows) == 0:
+        raise CampaignError("the campaign has no pose records of targets on the last link, expected some to verify by")
+    pose, which = np.unique(table.pose[rows], return_inverse=True)
+    target, column = np.unique(table.target[rows], return_inverse=True)
+    first = np.array([rows[np.argmax(which == k)] for k in range(len(pose))])
+    away = np.abs(table.commanded[rows] - table.commanded[first][which]).max(axis=1)
+    if (away > SAME_COMMAND).any():
+        wrong = int(pose[which[np.argmax(away)]])
+        raise CampaignError(f"pose {wrong} has rows with different commands, expected one standstill")
+    covariance = table.covariance_m2[rows]
+    stated = np.isfinite(covariance).all(axis=(1, 2))
+    covariance = np.where(stated[:, None, None], covariance, noise_m**2 * np.eye(3))
+    return Standstills(pose, table.commanded[first], target, _averaged(which, column, table.point_m[rows], covariance))
+
+
+def _averaged(row: np.ndarray, column: np.ndarray, point_m: Array, covariance: Array) -> PointSets:
+    """Shots of one target in one standstill averaged by their covariances."""
+    shape = (row.max() + 1, column.max() + 1)
+    information, pulled = np.zeros((*shape, 3, 3)), np.zeros((*shape, 3))
+    weight = np.linalg.inv(covariance)
+    np.add.at(information, (row, column), weight)
+    np.add.at(pulled, (row, column), np.einsum("mij,mj->mi", weight, point_m))
+    seen = information.any(axis=(2, 3))
+    spread = np.full((*shape, 3, 3), np.nan)
+    spread[seen] = np.linalg.inv(information[seen])
+    points = np.full((*shape, 3), np.nan)
+    points[seen] = np.einsum("mij,mj->mi", spread[seen], pulled[seen])
+    return PointSets(points, spread, seen)
