@@ -3,15 +3,16 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from app.scene.cameras import Camera, near
+from app.scene.cameras import UP, Camera, around, near
 from app.scene.colours import BLUE, FITTED_AXIS, GREY, HIGHLIGHT, NOMINAL_AXIS, VERMILLION, Rgb
 from app.scene.dimensions import Dimension, FrameSketch, dimensions, sketches
 from app.scene.error_vectors import factor_text
 from app.scene.poses import together
 from app.scene.solids import Solid, arrow, ball, merged
 from core.estimate import Geometry
-from core.geometry import Array
+from core.geometry import Array, cross
 from core.phi_model import PhiModel
 
 if TYPE_CHECKING:
@@ -32,9 +33,22 @@ class DiagnosisView:
         base: Array,
         reach_m: float,
         exaggeration: float,
+        direction: ArrayLike = (1.0, 0.0, 0.4),
         root: str = "/diagnosis",
     ) -> None:
-        """Draw all differences; arguments as for ``dimensions``, ``reach_m`` sets the sizes."""
+        """Draw all differences.
+
+        Args:
+            scene: the server's scene, or a client's.
+            nominal: as for ``dimensions``, with ``geometry`` and ``base``.
+            geometry: see there.
+            base: see there.
+            reach_m: of the arm; sets the sizes.
+            exaggeration: how many times too large differences are drawn.
+            direction: from the arm to the eye, (3,), for which labels are laid out.
+            root: name of the node that holds it all.
+        """
+        self.direction = np.asarray(direction, dtype=float)
         self._scene, self._root, self._reach = scene, root, reach_m
         self._models = (nominal, geometry, base)
         self._exaggeration = exaggeration
@@ -68,8 +82,15 @@ class DiagnosisView:
         with together(self._scene):
             self._draw_dimensions()
 
-    def camera(self, frame: int, parameter: str, direction: Array) -> Camera:
-        """A close view of one dimension from a direction.
+    def overview(self) -> Camera:
+        """A view that holds all differences with their labels."""
+        corners = [self._models[2][:3, 3], *(p for d in self.dimensions for p in (d.from_m, d.to_m))]
+        pad = 0.06 * self._reach * np.array([1.0, 1.0, 1.0])
+        points = np.vstack([np.array(corners), self._places()])
+        return around("Geometric errors", np.vstack([points - pad, points + pad]), self.direction, 1.1)
+
+    def camera(self, frame: int, parameter: str) -> Camera:
+        """A close view of one dimension.
 
         Raises:
             KeyError: there is no such dimension.
@@ -77,7 +98,7 @@ class DiagnosisView:
         for d in self.dimensions:
             if (d.frame, d.parameter) == (frame, parameter):
                 size = max(0.22 * self._reach, 1.4 * float(np.linalg.norm(d.to_m - d.from_m)))
-                return near(d.text, d.middle_m, direction, size)
+                return near(d.text, d.middle_m, self.direction, size)
         raise KeyError(f"frame {frame} has no dimension {parameter}")
 
     def remove(self) -> None:
@@ -124,7 +145,7 @@ class DiagnosisView:
         )
 
     def _draw_dimensions(self) -> None:
-        places = label_places(self.dimensions, 0.1 * self._reach, 0.45 * self._reach)
+        places = self._places()
         leaders = []
         for d, place in zip(self.dimensions, places, strict=True):
             key = (d.frame, d.parameter)
@@ -138,6 +159,9 @@ class DiagnosisView:
         self._scene.add_line_segments(
             f"{self._root}/leaders", ends, GREY, thickness=1.0, thickness_units="screen", visible=bool(leaders)
         )
+
+    def _places(self) -> Array:
+        return label_places(self.dimensions, 0.075 * self._reach, 0.45 * self._reach, self.direction)
 
     def _colour(self, dimension: Dimension, lit: bool) -> Rgb:
         if lit:
@@ -164,27 +188,32 @@ class DiagnosisView:
         )
 
 
-def label_places(drawn: tuple[Dimension, ...], height_m: float, width_m: float) -> Array:
+def label_places(drawn: tuple[Dimension, ...], height_m: float, width_m: float, direction: Array) -> Array:
     """Places for labels near their dimensions, (k, 3), one above the other where they would overlap.
 
-    Arms are looked at from the side, so labels that are ``width_m`` or less apart on the floor get ``height_m`` between
-    their heights.
+    Args:
+        drawn: the dimensions; labels of those that are not significant stay where they are.
+        height_m: way up the picture from one label to the next.
+        width_m: labels this far apart or further across the picture do not overlap.
+        direction: from the arm to the eye, (3,).
     """
     if not drawn:
         return np.zeros((0, 3))
+    right = cross(UP, direction)
+    right = right / np.linalg.norm(right)
+    over = cross(direction / np.linalg.norm(direction), right)
     # A little above, so that a label does not cover what it speaks of.
-    places = np.array([d.middle_m for d in drawn])
-    places[:, 2] += 0.8 * height_m
+    places = np.array([d.middle_m for d in drawn]) + 0.8 * height_m * over
     shown = np.array([d.significant for d in drawn])
-    apart = np.linalg.norm(places[:, None, :2] - places[None, :, :2], axis=2)
-    rivals = (apart < width_m) & shown[:, None] & shown[None]
+    across, up = places @ right, places @ over
+    rivals = (np.abs(across[:, None] - across) < width_m) & shown[:, None] & shown
     np.fill_diagonal(rivals, False)
-    order = np.argsort(np.argsort(places[:, 2], kind="stable"))
-    above = np.where(order[:, None] > order[None], 1.0, -1.0)
+    order = np.argsort(np.argsort(up, kind="stable"))
+    above = np.where(order[:, None] > order, 1.0, -1.0)
+    moved = up.copy()
     for _ in range(200):
-        gap = (places[:, None, 2] - places[None, :, 2]) * above
-        lacking = np.where(rivals, np.clip(height_m - gap, 0.0, None), 0.0)
+        lacking = np.where(rivals, np.clip(height_m - (moved[:, None] - moved) * above, 0.0, None), 0.0)
         if lacking.max() < 1e-3 * height_m:
             break
-        places[:, 2] += 0.25 * (lacking * above).sum(axis=1)
-    return places
+        moved = moved + 0.25 * (lacking * above).sum(axis=1)
+    return places + (moved - up)[:, None] * over

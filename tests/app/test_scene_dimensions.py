@@ -100,10 +100,11 @@ def test_an_endless_exaggeration_is_refused() -> None:
 
 def test_labels_that_are_shown_do_not_overlap() -> None:
     drawn = tuple(found(20.0).values())
-    places = label_places(drawn, 0.1, 0.7)
+    places = label_places(drawn, 0.1, 0.7, np.array([0.8, -0.3, 0.4]))
     shown = places[[d.significant for d in drawn]]
+    right = np.array([0.3, 0.8, 0.0]) / np.hypot(0.3, 0.8)
+    over = np.cross(np.array([0.8, -0.3, 0.4]) / np.sqrt(0.89), right)
     for k, one in enumerate(shown):
         for other in shown[k + 1 :]:
-            level = np.linalg.norm(one[:2] - other[:2])
-            assert level >= 0.7 or abs(one[2] - other[2]) > 0.09
-    assert np.array_equal(label_places((), 0.1, 0.7), np.zeros((0, 3)))
+            assert abs((one - other) @ right) >= 0.7 or abs((one - other) @ over) > 0.09
+    assert np.array_equal(label_places((), 0.1, 0.7, np.array([1.0, 0, 0])), np.zeros((0, 3)))

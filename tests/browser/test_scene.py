@@ -94,6 +94,7 @@ def build(dark: bool) -> Demo:
     residuals = refinement.residuals
     measured, verdict = table.point_m[residuals.row], np.zeros(len(residuals.row), dtype=int)
     verdict[3::17], verdict[7::19] = Verdict.DOUBTFUL, Verdict.EXCLUDED
+    views = {view.name: view for view in presets(bones, np.zeros(6), stations, height)}
     demo = Demo(
         server=server,
         calibration=calibration,
@@ -112,8 +113,9 @@ def build(dark: bool) -> Demo:
             estimate.geometry.base,
             bones.reach_m,
             fitting_exaggeration(calibration.nominal, estimate.geometry, bones.reach_m),
+            views["Arm"].position_m - views["Arm"].look_at_m,
         ),
-        views={view.name: view for view in presets(bones, np.zeros(6), stations, height)},
+        views=views,
         point_m=measured,
     )
     demo.points.on_click(lambda row, client: demo.clicked.append(row))
@@ -290,9 +292,8 @@ def test_pictures(opened, folder: Path) -> None:
     demo.robot.opacity = 0.25
     demo.diagnosis.exaggeration = factor
     demo.diagnosis.visible = True
-    page.wait_for_timeout(1500)
+    look(demo, page, demo.diagnosis.overview())
     page.screenshot(path=folder / f"scene_diagnosis_{theme}.png")
     demo.diagnosis.highlight(2, "b_m")
-    towards = demo.views["Arm"].position_m - demo.views["Arm"].look_at_m
-    look(demo, page, demo.diagnosis.camera(2, "b_m", towards))
+    look(demo, page, demo.diagnosis.camera(2, "b_m"))
     page.screenshot(path=folder / f"scene_highlight_{theme}.png")
