@@ -16,6 +16,7 @@ from shutil import copyfile
 
 from core.session_entries import SESSION_FORMAT, DamagedEntry, Entry, carved, decoded, newer
 from core.session_events import Closed, Copied, Opened, SessionError
+from core.session_journal import journal_parts
 from core.session_store import APPLICATION, SCHEMA, TROUBLE, connect
 
 LARGEST_FILE_BYTES = 1_000_000_000
@@ -163,13 +164,23 @@ def _with_open_end(path: Path, contents: Contents) -> Contents:
             )
             return Contents(contents.entries, warnings=(*contents.warnings, lost))
         return contents
-    # A journal keeps older generations of entries too; only those that follow the last row tell anything new.
-    beyond = {entry.seq: entry for entry in carved(journal) if entry.seq > last}
-    if not beyond:
-        return contents
-    found = tuple(beyond[seq] for seq in sorted(beyond))
-    told = f"{_counted(len(found))} at the end stood in the journal without being confirmed: taken over"
-    return Contents((*contents.entries, *found), found, (*contents.warnings, told))
+    parts = journal_parts(journal)
+    found, warnings = _after(parts.committed, last), list(contents.warnings)
+    if found:
+        warnings.append(f"{_counted(len(found))} at the end stood behind damage in the journal, and were taken over")
+    half = _after(parts.unsure, found[-1].seq if found else last)
+    if len(half) == 1:
+        warnings.append(f"event {half[0].seq} was being written when the program was cut off, and was taken over")
+        found += half
+    elif half:
+        warnings.append(f"{_counted(len(half))} were being written when the program was cut off, and are left out")
+    return Contents((*contents.entries, *found), found, tuple(warnings))
+
+
+def _after(journal: bytes, last: int) -> tuple[Entry, ...]:
+    """Entries with larger numbers; a journal keeps older ones too."""
+    found = {entry.seq: entry for entry in carved(journal) if entry.seq > last}
+    return tuple(found[seq] for seq in sorted(found))
 
 
 def _salvage(path: Path, reason: str) -> Contents:

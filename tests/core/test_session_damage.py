@@ -11,7 +11,7 @@ from session_scenes import busy_session, demo_session, take
 from core.errors import InputError
 from core.session import Session
 from core.session_entries import decoded, encoded
-from core.session_events import Closed, Copied, Opened, Titled
+from core.session_events import Closed, Copied, NoteWritten, Opened, Titled
 from core.session_library import copy_session, list_sessions
 from core.session_store import SCHEMA
 
@@ -130,11 +130,50 @@ def test_a_flipped_bit_in_the_journal_loses_no_other_event(cut_off: Path) -> Non
     data[32 + 16] ^= 1
     journal.write_bytes(data)
     with Session.open(cut_off) as session:
-        assert "without being confirmed: taken over" in session.state.warnings[0]
+        assert "stood behind damage in the journal" in session.state.warnings[0]
         assert not session.read_only
         session.append(Titled("goes on"))
     again = rows(cut_off)
     assert all(again[seq] == row for seq, row in whole.items())
+
+
+def test_what_was_never_committed_is_not_taken_over(cut_off: Path) -> None:
+    """A program may be killed when an event is written to the journal, and its commit is not."""
+    whole, journal = rows(cut_off), cut_off.with_name("a.trueaxis-wal")
+    data = bytearray(journal.read_bytes())
+    page = int.from_bytes(data[8:12], "big")
+    last = len(data) - page - 24
+    assert any(data[last + 4 : last + 8])
+    data[last + 4 : last + 8] = bytes(4)
+    journal.write_bytes(data)
+    with Session.open(cut_off) as session:
+        assert session.state.warnings == ()
+        assert len(session.entries) == len(whole)  # The last one is gone, "opened" is new.
+        assert session.entries[-1].kind == "opened"
+
+
+def test_a_damaged_last_frame_gives_its_event_if_that_is_intact(cut_off: Path) -> None:
+    whole, journal = rows(cut_off), cut_off.with_name("a.trueaxis-wal")
+    data = bytearray(journal.read_bytes())
+    data[-int.from_bytes(data[8:12], "big") - 1] ^= 1
+    journal.write_bytes(data)
+    with Session.open(cut_off) as session:
+        assert "was being written when the program was cut off, and was taken over" in session.state.warnings[0]
+        assert {entry.seq: encoded(entry) for entry in session.entries[:-1]} == whole
+
+
+def test_half_of_what_belongs_together_is_left_out(tmp_path: Path) -> None:
+    """Events that were appended together, and their last page did not reach the journal."""
+    with demo_session(tmp_path / "a.trueaxis") as session:
+        before = session.entries
+        session.append_all([NoteWritten(f"{number} " + "x" * 3000) for number in range(20)])
+        for suffix in ("", "-wal"):
+            shutil.copy(tmp_path / f"a.trueaxis{suffix}", tmp_path / f"b.trueaxis{suffix}")
+    journal = tmp_path / "b.trueaxis-wal"
+    journal.write_bytes(journal.read_bytes()[:-8000])
+    with Session.open(tmp_path / "b.trueaxis") as other:
+        assert other.entries[:-1] == before
+        assert "were being written when the program was cut off, and are left out" in other.state.warnings[0]
 
 
 @pytest.mark.parametrize("share", [0.5, 0.8, 0.99])
