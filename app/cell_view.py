@@ -6,20 +6,27 @@ import numpy as np
 
 from app.scene.axes import AxesView, AxisMark
 from app.scene.cameras import Camera, presets
+from app.scene.colours import GHOST, ResidualScale
+from app.scene.diagnosis import DiagnosisView
+from app.scene.dimensions import fitting_exaggeration
 from app.scene.error_vectors import ErrorVectors
 from app.scene.floor import draw_floor, floor_height, floor_under
 from app.scene.points import PointMarks, PointsView, Verdict
 from app.scene.robot import RobotView
+from app.scene.stage import prepare_stage
 from app.scene.stations import Station, StationsView
 from app.workbench import Workbench
 from core.calibration import Calibration
 from core.estimate import ArmEstimate
+from core.geometry import Array
 from core.twin.instruments import TheodolitePair
 
 if TYPE_CHECKING:
     import viser
 
-ORANGE, BLUE, GREY = (230, 159, 0), (0, 114, 178), (150, 155, 165)
+BLUE = (0, 114, 178)
+GHOST_SWELL_M = 0.01
+"""The ghost is that much thicker, so that it does not flicker with the arm inside it."""
 
 
 class CellView:
@@ -27,12 +34,15 @@ class CellView:
 
     def __init__(self, scene: "viser.SceneApi", bench: Workbench) -> None:
         self._scene, self._bench = scene, bench
-        scene.configure_default_lights(cast_shadow=False)
+        prepare_stage(scene)
         base = bench.cell.truth.base
         nominal = tuple(line.moved(base) for line in bench.cell.robot.axes_at_zero())
         sliding = bench.cell.robot.sliding
-        self.arm = RobotView(scene, "/arm", nominal, sliding)
-        self.ghost = RobotView(scene, "/nominal", nominal, sliding, opacity=0.25, swell_m=0.006)
+        couplings = bench.cell.robot.couplings
+        self.arm = RobotView(scene, "/arm", nominal, sliding, couplings=couplings)
+        self.ghost = RobotView(
+            scene, "/nominal", nominal, sliding, GHOST, 0.25, couplings=couplings, swell_m=GHOST_SWELL_M
+        )
         self.ghost.visible = False
         self._stations = _stations(bench)
         positions = np.array([s.position_m for s in self._stations]).reshape(-1, 3)
@@ -45,8 +55,12 @@ class CellView:
         self.errors.visible = False
         self._floor_m = height
         self._axes: AxesView | None = None
+        self._diagnosis: DiagnosisView | None = None
+        self._diagnosed = False
         self.drawn: Calibration | None = None
         """The calibration that is shown."""
+        self.scale = ResidualScale(1e-3)
+        """Colours of residuals since the last solution."""
         self.shown_shots: tuple[int, ...] = ()
         """Ids of the shots in the rows of ``points``."""
 
@@ -68,8 +82,7 @@ class CellView:
         self.shown_shots = tuple(s.id for s in shots)
         points = np.array([s.taken.point_m for s in shots]).reshape(-1, 3)
         verdicts = np.array([_verdict(s.verdict) for s in shots], dtype=int)
-        colours = np.array([GREY if v == Verdict.EXCLUDED else BLUE for v in verdicts], dtype=np.uint8).reshape(-1, 3)
-        self.points.show(PointMarks(np.arange(len(shots)), points, colours, verdicts))
+        self.points.show(PointMarks(np.arange(len(shots)), points, self._colours([s.record for s in shots]), verdicts))
         self.points.mark_last(points[-1] if len(points) else None)
         self.stations.aim(points[-1] if len(points) else None)
         expected = self._bench.expected()
@@ -81,12 +94,53 @@ class CellView:
     def show_calibration(self, found: Calibration) -> None:
         """Show the fitted axes with their uncertainty, the nominal arm as a ghost, and the residuals."""
         self.drawn = found
+        self.scale = ResidualScale.over(np.linalg.norm(found.refinement.residuals.residual_m, axis=1))
         marks = axis_marks(found.estimate)
         self._axes = AxesView(self._scene, "/axes", marks, self._bench.cell.robot.sliding, length_m=0.7)
         residuals = found.refinement.residuals
         measured = found.campaign.measurements.point_m[residuals.row]
         self.errors.show(measured, measured - residuals.residual_m)
+        if self._diagnosis is not None:
+            self._diagnosis.remove()
+            self._diagnosis = None
+        self.diagnose(self._diagnosed)
+        self.show_shots()
         self.follow(self._bench.robot.commanded)
+
+    def diagnose(self, wanted: bool, exaggeration: float | None = None) -> None:
+        """Show nominal and actual geometry together, every significant difference as a dimension with its value."""
+        self._diagnosed = wanted
+        found = self.drawn
+        if found is None or found.estimate.geometry is None or found.nominal is None:
+            return
+        if self._diagnosis is None and wanted:
+            geometry, reach = found.estimate.geometry, self.arm.bones.reach_m
+            camera = next(c for c in self.cameras() if c.name == "Arm")
+            way = camera.position_m - camera.look_at_m
+            direction = way / np.linalg.norm(way)
+            fitting = fitting_exaggeration(found.nominal, geometry, reach)
+            self._diagnosis = DiagnosisView(
+                self._scene,
+                found.nominal,
+                geometry,
+                geometry.base,
+                reach,
+                fitting,
+                direction / np.linalg.norm(direction),
+            )
+        if self._diagnosis is not None:
+            self._diagnosis.visible = wanted
+            if exaggeration is not None:
+                self._diagnosis.exaggeration = exaggeration
+        self.arm.opacity = 0.35 if wanted and self._diagnosis is not None else None
+
+    def _colours(self, records: list[int]) -> Array:
+        """Colours of shots: by radial residual of the last solution, plain before there is one, (k, 3)."""
+        if self.drawn is None:
+            return np.tile(np.array(BLUE, dtype=np.uint8), (len(records), 1))
+        residuals, table = self.drawn.refinement.residuals, self.drawn.campaign.measurements
+        radial = dict(zip(table.record[residuals.row].tolist(), residuals.radial_m.tolist(), strict=True))
+        return self.scale.colours(np.array([radial.get(record, np.nan) for record in records]))
 
 
 def axis_marks(estimate: ArmEstimate) -> tuple[AxisMark, ...]:

@@ -111,9 +111,9 @@ class Dashboard:
         first = self.server.initial_camera
         first.position, first.look_at, first.up = (tuple(v) for v in (camera.position_m, camera.look_at_m, camera.up))
 
-    def _clicked(self, row: int) -> None:
+    def _clicked(self, row: int, client_id: int) -> None:
         """A shot was clicked in 3-D: choose it in the measuring panel."""
-        if 0 <= row < len(self.cell.shown_shots):
+        if self.seat.may(client_id) and 0 <= row < len(self.cell.shown_shots):
             self.acquire.choose(self.cell.shown_shots[row])
 
     def _hotkeys(self) -> None:

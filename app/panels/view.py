@@ -27,6 +27,10 @@ class ViewPanel:
         self._errors.on_update(lambda _: setattr(cell.errors, "visible", bool(self._errors.value)))
         self._times = gui.add_dropdown("Residuals magnified", MAGNIFICATIONS, initial_value="200")
         self._times.on_update(self._magnify)
+        self._geometry = gui.add_checkbox("Geometry against design", False, hint="After solving every joint.")
+        self._geometry.on_update(lambda _: cell.diagnose(bool(self._geometry.value)))
+        self._swell = gui.add_dropdown("Differences enlarged", ("10", "20", "50", "100"), initial_value="20")
+        self._swell.on_update(self._enlarge)
         self._dark = gui.add_checkbox("Dark theme", False)
         self._dark.on_update(lambda _: on_dark(bool(self._dark.value)))
         keys = (
@@ -46,6 +50,10 @@ class ViewPanel:
         camera = next((c for c in self._cell.cameras() if c.name == self._camera.value), None)
         if camera is not None and event.client is not None:
             fly_to(event.client, camera)
+
+    def _enlarge(self, event: "viser.GuiEvent") -> None:
+        if self._swell.value.isdigit():
+            self._cell.diagnose(bool(self._geometry.value), float(self._swell.value))
 
     def _magnify(self, event: "viser.GuiEvent") -> None:
         if self._times.value in MAGNIFICATIONS:
