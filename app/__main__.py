@@ -22,7 +22,9 @@ COMMANDS = {
     "calibrate": "calibrate an arm from its single-axis sweeps: JSON, report and tables",
     "simulate": "make a campaign by measuring a simulated arm, with faults if you like",
     "axis": "find one joint axis from a plain CSV of points",
+    "verify": "errors of the nominal and the calibrated arm over the pose records",
     "compensate": "find the commands that make the calibrated arm take given poses",
+    "export": "the calibrated robot for other tools: URDF, MJCF, Denavit-Hartenberg rows, JSON",
 }
 
 

@@ -144,6 +144,15 @@ def overall(each: tuple[str, ...]) -> str:
     return "fail" if "fail" in each else "undecided" if "undecided" in each else "pass"
 
 
+def calibrated_verdict(found: Verification) -> str:
+    """Whether the calibrated arm keeps the operator's limits: pass, fail or undecided; empty without limits."""
+    each = (
+        *verdicts(found.calibrated.position, found.limits.position_m),
+        *verdicts(found.calibrated.orientation, found.limits.orientation_rad),
+    )
+    return overall(each) if each else ""
+
+
 def _against(measured: EndEffector, arm: CalibratedArm, robot: Robot, net: Array) -> ModelErrors:
     predicted = arm.base @ link_frames(robot, net)[:, -2] @ measured.on_link
     shift = measured.pose[:, :3, 3] - predicted[:, :3, 3]

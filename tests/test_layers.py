@@ -27,6 +27,12 @@ CALIBRATION = """
     core.walk_from_base core.joint_by_joint core.refinement_problem core.refined_curves core.refinement
     core.live_sweep core.findings core.calibration
 """
+SESSIONS = """
+    core.instruments core.session_robot core.session_values core.session_journal core.session_plan
+    core.session_events core.session_entries core.session_import core.session_shots core.session_state
+    core.session_lock core.session_store core.session_checks core.session_fold core.session_reader
+    core.session_timeline core.session core.session_library core.session_campaign
+"""
 RESULTS = """
     core.wording core.report core.json_values core.json_records core.robot_json
     core.axis_json core.motion_json core.calibration_json
@@ -36,13 +42,16 @@ USE = """
     core.driven_robot core.pose_iteration core.pose_seeds core.inverse_kinematics
     core.calibrated_arm core.calibration_file core.pose_files core.compensation
     core.rigid_pose core.standstills core.end_effector core.verification core.repeatability core.verification_json
+    core.robot_export core.dh_export
 """
 APP = """
     app.paths app.progress app.output app.standard_output app.summary
     app.figures app.report_page app.report_cells app.report_words app.report_tables app.report_html
+    app.verification_report
+    app.scene app.workbench app.jobs app.words app.cell_view app.panels app.dashboard
     app.commands app.__main__
 """
-ORDER = (FOUNDATION + FILES + CALIBRATION + RESULTS + USE + APP).split()
+ORDER = (FOUNDATION + FILES + CALIBRATION + SESSIONS + RESULTS + USE + APP).split()
 
 DRAWING = {"viser", "plotly", "jinja2", "matplotlib"}
 TABLES = {"pandas"}
