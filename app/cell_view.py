@@ -94,7 +94,7 @@ class CellView:
     def show_calibration(self, found: Calibration) -> None:
         """Show the fitted axes with their uncertainty, the nominal arm as a ghost, and the residuals."""
         self.drawn = found
-        self.scale = ResidualScale.over(np.linalg.norm(found.refinement.residuals.residual_m, axis=1))
+        self.scale = ResidualScale.over(found.refinement.residuals.radial_m)
         marks = axis_marks(found.estimate)
         self._axes = AxesView(self._scene, "/axes", marks, self._bench.cell.robot.sliding, length_m=0.7)
         residuals = found.refinement.residuals
@@ -132,7 +132,10 @@ class CellView:
             self._diagnosis.visible = wanted
             if exaggeration is not None:
                 self._diagnosis.exaggeration = exaggeration
-        self.arm.opacity = 0.35 if wanted and self._diagnosis is not None else None
+        shown = wanted and self._diagnosis is not None
+        self.arm.opacity = 0.35 if shown else None
+        if self._axes is not None:
+            self._axes.labels_visible = not shown
 
     def _colours(self, records: list[int]) -> Array:
         """Colours of shots: by radial residual of the last solution, plain before there is one, (k, 3)."""

@@ -93,6 +93,7 @@ class Dashboard:
             self.results.refresh()
             if self.bench.calibration is not None and self.results.drawn is not self.cell.drawn:
                 self.cell.show_calibration(self.bench.calibration)
+            self.view.refresh()
 
     def stop(self) -> None:
         """Close server, worker and session."""

@@ -9,19 +9,19 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import msgspec
 import numpy as np
 
 from core.calibration import Calibration, calibrate
 from core.calibration_json import calibration_to_json
 from core.geometry import Array
-from core.instruments import Desk, MeasureRequest, Reading
+from core.instruments import Desk, MeasureRequest
 from core.kinematics import nominal_net
 from core.live_sweep import LiveSweep, expected_point, live_sweep
 from core.session import Session
 from core.session_campaign import to_campaign
-from core.session_events import Failed, Judged, SessionError, ShotTaken, Skipped, Solved, WentTo
+from core.session_events import Failed, Judged, SessionError, Skipped, Solved, WentTo
 from core.session_plan import PlannedSweep, Step
+from core.session_shots import shot_at
 from core.session_state import Shot, State
 from core.twin.cell import Cell
 from core.twin.instrument import DemoInstrument, DemoRobot
@@ -235,7 +235,7 @@ class Workbench:
         except Exception as wrong:
             self.session.append(Failed(str(wrong) or type(wrong).__name__), by)
             raise
-        return self.session.append(_shot(step, reading, replaces), by).shots[-1]
+        return self.session.append(shot_at(step, reading, replaces=replaces), by).shots[-1]
 
     def _left(self, first: Step | None, whole_plan: bool) -> int:
         closed = self.state.done | self.state.skipped.keys()
@@ -244,26 +244,6 @@ class Workbench:
             for s in self.state.steps
             if s.key not in closed and (whole_plan or (first is not None and _sweep_of(s) == _sweep_of(first)))
         )
-
-
-def _shot(step: Step, reading: Reading, replaces: int | None) -> ShotTaken:
-    approach = [0] * len(step.commanded)
-    approach[step.joint - 1] = step.sense
-    event = ShotTaken(
-        target=step.target,
-        commanded=step.commanded,
-        point_m=reading.point_m,
-        covariance_m2=reading.covariance_m2,
-        joint=step.joint,
-        sweep=step.sweep,
-        step=step.step,
-        approach=tuple(approach),
-        angles_rad=reading.angles_rad,
-        time_s=reading.time_s,
-        temperature_c=reading.temperature_c,
-        arm_temperature_c=reading.arm_temperature_c,
-    )
-    return event if replaces is None else msgspec.structs.replace(event, replaces=replaces)
 
 
 def _covariances(shots: tuple[Shot, ...]) -> Array | None:

@@ -4,7 +4,9 @@
     ├── InputError            what was given is wrong; the sentence names place, value and what was expected
     │   ├── CampaignError     a campaign folder, its measurements or its description
     │   ├── RobotError        the description of a robot
-    │   └── AxisUndefined     these points cannot define a joint axis
+    │   ├── AxisUndefined     these points cannot define a joint axis
+    │   └── SessionError      a session file or an event cannot be used (in session_events)
+    ├── InstrumentFailed      an instrument or a robot did not do what it was asked for (in instruments)
     └── NotConverged          an iteration did not reach its answer
 
 Every message is one sentence that can be shown to a person as it is.

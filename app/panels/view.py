@@ -1,10 +1,12 @@
 """What is shown in 3-D, and from where."""
 
 from collections.abc import Callable
+from html import escape
 from typing import TYPE_CHECKING
 
 from app.cell_view import CellView
 from app.scene.cameras import fly_to
+from app.scene.colours import hex_of
 from app.words import block
 
 if TYPE_CHECKING:
@@ -33,6 +35,7 @@ class ViewPanel:
         self._swell.on_update(self._enlarge)
         self._dark = gui.add_checkbox("Dark theme", False)
         self._dark.on_update(lambda _: on_dark(bool(self._dark.value)))
+        self._legend = gui.add_html("")
         keys = (
             ("Space", "Measure the next shot"),
             ("R", "Measure the chosen shot again"),
@@ -45,6 +48,18 @@ class ViewPanel:
                 f"<h3>Keys</h3><table>{rows}</table><p class='soft'>Keys are off while you type in a box.</p>", "keys"
             )
         )
+
+    def refresh(self) -> None:
+        """Show what the colours of the shots mean."""
+        if self._cell.drawn is None:
+            words = "<p class='soft'>Shots are coloured by their residual once there is a solution.</p>"
+        else:
+            steps = "".join(
+                f"<span style='color:{hex_of(step.colour)}'>⬤</span> {escape(step.text)}&emsp;"
+                for step in self._cell.scale.legend()
+            )
+            words = f"<h3>Radial residual of a shot</h3><p>{steps}</p>"
+        self._legend.content = block(words, "legend")
 
     def _fly(self, event: "viser.GuiEvent") -> None:
         camera = next((c for c in self._cell.cameras() if c.name == self._camera.value), None)

@@ -7,12 +7,12 @@ import numpy as np
 
 from core.geometry import Array
 from core.measurements import POSE, Campaign, Measurements
+from core.session_plan import commands_for
 from core.twin import irb_l6
 from core.twin.cell import Cell, Truth
 from core.twin.effects import Effect
 from core.twin.forward import faulty_truth, true_points
 from core.twin.noise import Noise, Repeatability
-from core.twin.protocol import commands_of_motors
 
 NOISY = Noise()
 
@@ -84,7 +84,7 @@ def _prepared(cell: Cell, effects: tuple[Effect, ...]) -> Cell:
 def _measurements(cell: Cell, points_m: Array, covariance_m2: Array) -> Measurements:
     rows = cell.schedule
     count = len(rows.stop)
-    speed = commands_of_motors(cell.robot, rows.speed)[rows.stop] if cell.protocol.in_motion else None
+    speed = commands_for(cell.robot, rows.speed)[rows.stop] if cell.protocol.in_motion else None
     return Measurements(
         record=np.arange(1, count + 1),
         phase=rows.column("phase"),

@@ -14,6 +14,7 @@ from core.geometry import Array
 from core.kinematics import active_commands
 from core.measurements import POSE, SWEEP
 from core.robot import Robot
+from core.session_plan import commands_for
 
 TURNING_SPEEDS_RAD_S = tuple(np.deg2rad([4.0, 16.0, 9.0]))
 SLIDING_SPEEDS_M_S = (0.02, 0.08, 0.045)
@@ -86,7 +87,7 @@ class Schedule:
     @cached_property
     def commanded(self) -> Array:
         """What the controller is told at each stop, (s, n)."""
-        return commands_of_motors(self.robot, self.motors)
+        return commands_for(self.robot, self.motors)
 
     @cached_property
     def path(self) -> tuple[Array, np.ndarray]:
@@ -139,14 +140,6 @@ class Schedule:
     def column(self, name: str) -> np.ndarray:
         """One attribute of the stops, a value a row, (m,)."""
         return np.array([getattr(stop, name) for stop in self.stops])[self.stop]
-
-
-def commands_of_motors(robot: Robot, motors: Array) -> Array:
-    """The commands that a controller turns into motor displacements (s, n): the inverse of ``active_commands``."""
-    commanded = np.array(motors, dtype=float)
-    gains, compensated = robot.coupling_gains, robot.coupling_compensated
-    commanded[:, 1:] += np.where(compensated[1:], gains[1:], 0.0) * motors[:, :-1]
-    return commanded
 
 
 def lay_out(robot: Robot, centre: Array, protocol: Protocol, names: tuple[str, ...]) -> Schedule:

@@ -11,11 +11,11 @@ from core.measurements import POSE, SWEEP
 from core.phi_convention import convention_for
 from core.phi_model import axes, from_axes, near
 from core.robot_files import read_robot
+from core.session_plan import commands_for
 from core.twin import irb_l6, irb_l6_arm, scara
 from core.twin.campaign import both_ways, in_motion, simulate_campaign, truth
 from core.twin.cell import Cell
 from core.twin.noise import Noise, Repeatability
-from core.twin.protocol import commands_of_motors
 
 SILENT = Noise(instrument=False, repeatability=False)
 CELLS = [irb_l6.cell, scara.cell]
@@ -278,7 +278,7 @@ def test_in_motion_speeds_are_recorded(silent):
 def test_motors_and_commands_are_each_other_s_inverse(make):
     robot = make().robot
     motors = np.random.default_rng(2).normal(size=(5, robot.joint_count))
-    np.testing.assert_allclose(active_commands(robot, commands_of_motors(robot, motors)), motors, atol=1e-14)
+    np.testing.assert_allclose(active_commands(robot, commands_for(robot, motors)), motors, atol=1e-14)
 
 
 def test_the_scara_slides_by_its_ratio():
