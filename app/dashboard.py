@@ -90,10 +90,12 @@ class Dashboard:
             self.start.refresh()
             self.acquire.refresh()
             self.solve.refresh()
-            self.results.refresh()
-            if self.bench.calibration is not None and self.results.drawn is not self.cell.drawn:
+        # Words and shots are on their way before plots, which take longer, are drawn.
+        self.results.refresh()
+        if self.bench.calibration is not None and self.bench.calibration is not self.cell.drawn:
+            with self.server.atomic():
                 self.cell.show_calibration(self.bench.calibration)
-            self.view.refresh()
+        self.view.refresh()
 
     def stop(self) -> None:
         """Close server, worker and session."""

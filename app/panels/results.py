@@ -72,7 +72,7 @@ class ResultsPanel:
     def _draw_live(self) -> None:
         state = self._bench.state
         last = next((s for s in reversed(state.shots) if s.taken.phase == "sweep"), None)
-        key = (state.changed_utc, len(state.shots), None if last is None else last.id)
+        key = (None if last is None else last.id, tuple(s.id for s in state.shots if s.counts))
         if last is None or key == self._live_key:
             return
         self._live_key = key
