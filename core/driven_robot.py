@@ -16,6 +16,8 @@ from core.geometry import Array
 from core.motion_forms import MotionFunction, coupling_form, transmission_form
 from core.robot import JointKind, Robot
 
+FEW_JOINTS_WEIGHT = 0.01
+"""Of rotations for an arm that cannot take every one: its position comes first."""
 LIMIT_SLACK = 1e-9
 """Commands this far beyond a limit are rounding, rad or m."""
 
@@ -52,6 +54,11 @@ class DrivenRobot:
         """A length by which positions and rotations are weighed against each other: the size of the chain."""
         steps = np.linalg.norm(self.chain.link_transforms[:, :3, 3], axis=1)
         return float(max(steps.sum(), 0.01))
+
+    @property
+    def turn_weight(self) -> float:
+        """How much a radian weighs against a reach; little where not every orientation can be had anyway."""
+        return 1.0 if len(self.free) >= 6 else FEW_JOINTS_WEIGHT
 
     @property
     def shoulder_m(self) -> Array:

@@ -245,7 +245,8 @@ class _Search:
     def _errors(self, rows: np.ndarray, net: Array) -> tuple[Array, Array]:
         wanted = np.moveaxis(self._poses[rows], 0, 2)
         missing = misfits(self._robot, chain_state(self._robot, net), wanted)
-        return np.linalg.norm(missing[:3], axis=0) * self._robot.reach_m, np.linalg.norm(missing[3:], axis=0)
+        position, rotation = np.linalg.norm(missing[:3], axis=0), np.linalg.norm(missing[3:], axis=0)
+        return position * self._robot.reach_m, rotation / self._robot.turn_weight
 
 
 def _found(robot: DrivenRobot, poses: Array, limited: bool, effort: Effort) -> tuple[np.ndarray, Array]:

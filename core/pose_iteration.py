@@ -1,7 +1,7 @@
 """Thousands of poses at once brought to where they are wanted, by damped least squares with the analytic Jacobian.
 
 The misfit of a pose is a vector of six: the way that is missing, in units of the arm's reach, and the rotation vector
-that is missing. Each pose has its own damping: a step that brings the tool nearer is taken and the damping falls, any
+that is missing (weighed less for an arm that cannot take every orientation). Each pose has its own damping: a step that brings the tool nearer is taken and the damping falls, any
 other is refused and it grows (Levenberg 1944, doi 10.1090/qam/10666; Marquardt 1963, doi 10.1137/0111030). It goes with
 the square of the misfit, so that it leaves the last steps alone (Yamashita and Fukushima 2001, doi
 10.1007/978-3-7091-6217-0_18), even next to a singular pose. It grows faster from refusal to
@@ -97,6 +97,7 @@ def scaled_jacobian(robot: DrivenRobot, state: ChainState) -> Array:
     for i in np.flatnonzero(robot.chain.sliding):
         jacobian[:3, i], jacobian[3:, i] = state.axes[i], 0.0
     jacobian[:3] /= robot.reach_m
+    jacobian[3:] *= robot.turn_weight
     return jacobian
 
 
@@ -105,7 +106,7 @@ def misfits(robot: DrivenRobot, state: ChainState, wanted: Array) -> Array:
     out = np.empty((6, wanted.shape[2]))
     out[:3] = (wanted[:3, 3] - state.position) / robot.reach_m
     rotation = np.einsum("ikm,kjm->ijm", wanted[:3, :3], state.columns)
-    out[3:] = rotation_vectors(rotation)
+    out[3:] = rotation_vectors(rotation) * robot.turn_weight
     return out
 
 

@@ -236,6 +236,7 @@ def test_the_fast_chain_agrees_with_the_plain_one() -> None:
         np.testing.assert_allclose(np.transpose(state.columns, (2, 1, 0)), poses[:, :3, :3], rtol=0, atol=1e-13)
         jacobian = joint_jacobian(robot.chain, net)
         jacobian[:, :3] /= robot.reach_m
+        jacobian[:, 3:] *= robot.turn_weight
         np.testing.assert_allclose(np.moveaxis(scaled_jacobian(robot, state), 2, 0), jacobian, rtol=0, atol=1e-13)
 
 
