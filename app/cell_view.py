@@ -107,6 +107,20 @@ class CellView:
         self.show_shots()
         self.follow(self._bench.robot.commanded)
 
+    def forget(self) -> None:
+        """Take away what a solution has drawn."""
+        if self.drawn is None:
+            return
+        self.drawn = None
+        if self._axes is not None:
+            self._axes.remove()
+            self._axes = None
+        if self._diagnosis is not None:
+            self._diagnosis.remove()
+            self._diagnosis = None
+        self.arm.opacity = None
+        self.errors.show(np.zeros((0, 3)), np.zeros((0, 3)))
+
     def diagnose(self, wanted: bool, exaggeration: float | None = None) -> None:
         """Show nominal and actual geometry together, every significant difference as a dimension with its value."""
         self._diagnosed = wanted

@@ -16,6 +16,7 @@ import viser
 from app.cell_view import CellView
 from app.jobs import Jobs
 from app.panels.acquire import AcquirePanel
+from app.panels.check import CheckPanel
 from app.panels.export import ExportPanel
 from app.panels.results import ResultsPanel
 from app.panels.seat import Seat
@@ -53,6 +54,8 @@ class Dashboard:
         tabs = gui.add_tab_group()
         with tabs.add_tab("1 Cell"):
             self.start = StartPanel(gui, bench, self.ask)
+        with tabs.add_tab("Check"):
+            self.check = CheckPanel(gui, bench, self.ask)
         with tabs.add_tab("2 Measure"):
             self.acquire = AcquirePanel(gui, bench, self.ask)
         with tabs.add_tab("3 Solve"):
@@ -85,9 +88,12 @@ class Dashboard:
     def refresh(self) -> None:
         """Draw everything anew from the session."""
         with self.server.atomic():
+            if self.bench.calibration is None:
+                self.cell.forget()
             self.cell.show_shots()
             self.cell.follow(self.bench.robot.commanded)
             self.start.refresh()
+            self.check.refresh()
             self.acquire.refresh()
             self.solve.refresh()
         # Words and shots are on their way before plots, which take longer, are drawn.

@@ -19,7 +19,7 @@ from core.kinematics import nominal_net
 from core.live_sweep import LiveSweep, expected_point, live_sweep
 from core.session import Session
 from core.session_campaign import to_campaign
-from core.session_events import Failed, Judged, SessionError, Skipped, Solved, WentTo
+from core.session_events import CheckShot, Failed, Judged, SessionError, Skipped, Solved, WentTo
 from core.session_plan import PlannedSweep, Step
 from core.session_shots import shot_at
 from core.session_state import Shot, State
@@ -49,14 +49,19 @@ class Workbench:
 
     def __init__(self, session: Session, cell: Cell, seed: int = 1) -> None:
         self.session, self.cell = session, cell
-        before = len(session.state.shots)
-        self.robot = DemoRobot(cell, seed, visits_before=before)
-        self.desk = Desk(DemoInstrument(cell, self.robot, seed, shots_before=before))
+        self._seed = seed
+        self._start_cell()
         self.calibration: Calibration | None = None
         self.previous: Calibration | None = None
         self._listeners: list[Callable[[], None]] = []
         self._one_shot = threading.Lock()
         self._stop = threading.Event()
+
+    def _start_cell(self) -> None:
+        """The demo robot and instrument, going on with fresh noise after the shots that there are."""
+        before = len(self.session.state.shots) + sum(len(check.shots) for check in self.session.state.checks)
+        self.robot = DemoRobot(self.cell, self._seed, visits_before=before)
+        self.desk = Desk(DemoInstrument(self.cell, self.robot, self._seed, shots_before=before))
 
     @property
     def state(self) -> State:
@@ -121,6 +126,35 @@ class Workbench:
         """Stop a run after the shot in progress, and cancel that."""
         self._stop.set()
         self.desk.cancel()
+
+    def check_instrument(self, target: str, shots: int, by: str | None = None) -> None:
+        """Shoot one target several times while the arm stands still; every shot is on the disk at once."""
+        number = len(self.state.checks) + 1
+        with self._one_shot:
+            for _ in range(shots):
+                reading = self.desk.measure(MeasureRequest(target, self.robot.commanded), TIMEOUT_S)
+                self.session.append(
+                    CheckShot(
+                        number,
+                        target,
+                        reading.point_m,
+                        reading.covariance_m2,
+                        reading.angles_rad,
+                        reading.time_s,
+                        reading.temperature_c,
+                    ),
+                    by,
+                )
+        self.changed()
+
+    def switch(self, session: Session) -> None:
+        """Work on another session of the same cell; the one at hand is closed."""
+        with self._one_shot:
+            old, self.session = self.session, session
+            self._start_cell()
+            self.calibration = self.previous = None
+            old.close()
+        self.changed()
 
     def skip(self, reason: str, by: str | None = None) -> None:
         """Leave out the next planned shot."""

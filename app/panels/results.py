@@ -56,9 +56,12 @@ class ResultsPanel:
         """Draw what has changed."""
         self._draw_live()
         found = self._bench.calibration
-        if found is None or found is self.drawn:
+        if found is self.drawn:
             return
         self.drawn = found
+        if found is None:
+            self._forget()
+            return
         sweeps = tuple(f.sweep.name for f in found.found.fits)
         joints = tuple(str(j) for j in found.found.swept)
         _offer(self._sweep, sweeps)
@@ -69,13 +72,23 @@ class ResultsPanel:
         self._show(self._deviations, figure or _empty("Solve every joint to compare with the design"))
         self._table.content = table_2(found)
 
+    def _forget(self) -> None:
+        """Empty plots, as before the first solution."""
+        self._show(self._residuals, _empty("Solve to see residuals"))
+        self._show(self._drive, _empty("Solve to see what the drives do"))
+        self._show(self._deviations, _empty("Solve every joint to compare with the design"))
+        self._table.content = block("<p class='soft'>Solve every joint to compare with the design.</p>", "table2")
+
     def _draw_live(self) -> None:
         state = self._bench.state
         last = next((s for s in reversed(state.shots) if s.taken.phase == "sweep"), None)
         key = (None if last is None else last.id, tuple(s.id for s in state.shots if s.counts))
-        if last is None or key == self._live_key:
+        if key == self._live_key:
             return
         self._live_key = key
+        if last is None:
+            self._show(self._live, _empty("Nothing is measured yet"))
+            return
         joint = last.taken.joint
         live, shots = self._bench.live(joint, last.taken.sweep)
         command = np.array([s.taken.commanded[joint - 1] for s in shots])

@@ -146,3 +146,33 @@ def test_a_read_only_session_refuses_in_a_sentence(bench):
     watching = Workbench(Session.open(bench.session.path), bench.cell)
     with pytest.raises(TrueaxisError):
         watching.measure()
+
+
+def test_checking_the_instrument_shows_its_promise_kept(bench):
+    bench.check_instrument("T1", 8)
+    check = bench.state.checks[-1]
+    promise = bench.state.instrument.sigma_m * 3**0.5
+    assert len(check.shots) == 8
+    assert 0.4 * promise < check.net_radial_m < 1.8 * promise
+    assert bench.state.shots == ()
+
+
+def test_switching_to_another_session_forgets_the_solution_and_closes_the_first(bench, tmp_path):
+    bench.run(False)
+    bench.solve()
+    first = bench.session
+    bench.switch(Session.create(tmp_path / f"b{SUFFIX}", demo_events(bench.cell)))
+    assert first.read_only
+    assert bench.calibration is None
+    assert bench.state.shots == ()
+    bench.measure()
+    assert len(bench.state.shots) == 1
+
+
+def test_the_next_shot_is_expected_where_it_comes(bench):
+    assert bench.expected() is None
+    for _ in range(10):
+        bench.measure()
+    expected, _ = bench.expected()
+    seen = bench.measure().taken.point_m
+    assert np.linalg.norm(expected - np.array(seen)) < 5e-3

@@ -241,3 +241,21 @@ def test_hostile_names_are_shown_as_they_are(chromium, dashboard):
         assert page.problems == []
     finally:
         page.close()
+
+
+def test_check_the_instrument_then_begin_a_new_session(page, dashboard):
+    tab(page, "Check")
+    press(page, "Check")
+    wait_for_text(page, "check", "8 shots at T1")
+    tab(page, "2 Measure")
+    measure(page, 2)
+    first = dashboard.bench.session.path.name
+    tab(page, "1 Cell")
+    group(page, "New")
+    page.wait_for_function(
+        "first => !document.querySelector('[data-testid=cell]').innerText.includes(first)", arg=first
+    )
+    tab(page, "2 Measure")
+    wait_for_text(page, "step", "stop 1 of 17")
+    assert dashboard.bench.state.shots == ()
+    assert dashboard.bench.session.path.name != first
