@@ -64,7 +64,7 @@ class Dashboard:
             self.export = ExportPanel(gui, bench, self.ask)
         with tabs.add_tab("View"):
             self.view = ViewPanel(gui, self.cell, self._darken)
-        self.results = ResultsPanel(gui, bench)
+        self.results = ResultsPanel(gui, bench, self.ask)
         self.cell.points.on_click(self._clicked)
         bench.on_change(self.refresh)
         self._hotkeys()

@@ -15,6 +15,7 @@ STYLE = """<style>
 .ta table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
 .ta th{font-weight:600;text-align:left;border-bottom:1px solid var(--mantine-color-default-border);padding:2px 5px}
 .ta td{padding:2px 5px;border-bottom:1px solid var(--mantine-color-default-border)}
+.ta td:first-child{overflow-wrap:normal}
 .ta td.n,.ta th.n{text-align:right}.ta tr.now td{font-weight:700;background:rgba(0,114,178,.13)}
 .ta .ok{color:#009E73}.ta .doubt{color:#B07A00}.ta .bad{color:#D55E00}.ta .soft{opacity:.7}
 .ta code{font-size:12px;user-select:all;overflow-wrap:anywhere}

@@ -1,5 +1,6 @@
 """The right side: the sweep that is being measured, and plots and tables of the last solution."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,26 +12,31 @@ from app.figures.live import live_figure
 from app.figures.residuals import residual_figure
 from app.figures.style import CONFIG, in_theme
 from app.figures.transmissions import transmission_figure
+from app.table_2 import Limits, table_2
 from app.words import block
 from app.workbench import Workbench
+from core.errors import InputError
+from core.session_events import Setting
 
 if TYPE_CHECKING:
     from core.calibration import Calibration
 
 WIDTH_PX = 520
+LIMITS = {"limit_length_mm": "Limit for lengths [mm]", "limit_angle_deg": "Limit for angles [deg]"}
+"""Keys of the session's settings, and what they are called."""
 
 
 class ResultsPanel:
     """Tabs: live, residuals, drives, geometry."""
 
-    def __init__(self, gui: viser.GuiApi, bench: Workbench) -> None:
-        self._bench = bench
+    def __init__(self, gui: viser.GuiApi, bench: Workbench, ask: Callable) -> None:
+        self._bench, self._ask = bench, ask
         self.drawn: Calibration | None = None
         self._live_key: tuple = ()
         self._dark = False
         panel = gui.add_panel()
         with panel.add_tab("This sweep"):
-            self._live = _plot(gui, _empty("Nothing is measured yet"))
+            self._live = _plot(gui, _empty("Measure a shot to see its residuals here"))
         with panel.add_tab("Residuals"):
             self._sweep = gui.add_dropdown("Sweep", ("-",))
             self._sweep.on_update(lambda _: self._draw_sweep())
@@ -44,6 +50,11 @@ class ResultsPanel:
             self._table = gui.add_html(
                 block("<p class='soft'>Solve every joint to compare with the design.</p>", "table2")
             )
+            self._limits = {
+                key: gui.add_number(label, float(bench.state.settings.get(key, 0.0)), min=0.0, max=1e4, step=0.001)
+                for key, label in LIMITS.items()
+            }
+            gui.add_button("Keep limits", hint="0: no limit").on_click(self._keep_limits)
         panel.dock_right()
         panel.set_width(540)
 
@@ -51,6 +62,25 @@ class ResultsPanel:
         """Draw everything anew for a dark or a light page."""
         self._dark, self._live_key, self.drawn = dark, (), None
         self.refresh()
+
+    def _keep_limits(self, event: viser.GuiEvent) -> None:
+        asked = {key: box.value for key, box in self._limits.items()}
+
+        def job(client: object) -> None:
+            for key, value in asked.items():
+                if not (isinstance(value, int | float) and np.isfinite(value) and 0 <= value <= 1e4):
+                    raise InputError(f"{LIMITS[key]}: {value!r}, expected a number from 0 (no limit) to 10000")
+            self._bench.session.append_all([Setting(key, float(value)) for key, value in asked.items()])
+            self._bench.changed()
+            self._draw_table()
+
+        self._ask(event, job)
+
+    def _draw_table(self) -> None:
+        settings = self._bench.state.settings
+        if self.drawn is not None:
+            limits = Limits(*(float(settings.get(key, 0.0)) for key in LIMITS))
+            self._table.content = table_2(self.drawn, limits)
 
     def refresh(self) -> None:
         """Draw what has changed."""
@@ -70,7 +100,7 @@ class ResultsPanel:
         self._draw_joint()
         figure = deviations_figure(found)
         self._show(self._deviations, figure or _empty("Solve every joint to compare with the design"))
-        self._table.content = table_2(found)
+        self._draw_table()
 
     def _forget(self) -> None:
         """Empty plots, as before the first solution."""
@@ -87,7 +117,7 @@ class ResultsPanel:
             return
         self._live_key = key
         if last is None:
-            self._show(self._live, _empty("Nothing is measured yet"))
+            self._show(self._live, _empty("Measure a shot to see its residuals here"))
             return
         joint = last.taken.joint
         live, shots = self._bench.live(joint, last.taken.sweep)
@@ -109,38 +139,6 @@ class ResultsPanel:
 
     def _show(self, plot: viser.GuiPlotlyHandle, figure: go.Figure) -> None:
         plot.figure = in_theme(figure, self._dark)
-
-
-def table_2(found: "Calibration") -> str:
-    """Nominal, actual, difference and uncertainty of every parameter."""
-    geometry = found.estimate.geometry
-    if geometry is None or found.nominal is None:
-        missing = ", ".join(map(str, found.not_swept)) or "some"
-        return block(f"<p class='soft'>The geometry needs every joint; not swept yet: {missing}.</p>", "table2")
-    rows = ""
-    scales = ((1e3, "mm"), (1e3, "mm"), (180 / np.pi, "deg"), (180 / np.pi, "deg"))
-    for i, (nominal, actual, std) in enumerate(
-        zip(found.nominal.parameters, geometry.model.parameters, geometry.std, strict=True)
-    ):
-        for k, name in enumerate(("a", "b", "α", "θ")):
-            scale, unit = scales[k]
-            if std[k] == 0:
-                continue
-            difference, u = (actual[k] - nominal[k]) * scale, std[k] * scale
-            digits = int(np.clip(1 - np.floor(np.log10(u)), 0, 4))
-            mark = "<span class='bad'>▲</span>" if abs(difference) > 2 * u else "○"
-            rows += (
-                f"<tr><td>{name}<sub>{i + 1}</sub></td><td class='n'>{nominal[k] * scale + 0.0:z.{digits}f}</td>"
-                f"<td class='n'>{actual[k] * scale:z.{digits}f}</td><td class='n'>{difference:+.{digits}f}</td>"
-                f"<td class='n'>{u:.{digits}f}</td><td>{unit}</td><td>{mark}</td></tr>"
-            )
-    numbers = "".join(f"<th class='n'>{name}</th>" for name in ("Nominal", "Actual", "Difference", "±u"))
-    head = f"<tr><th></th>{numbers}<th></th><th></th></tr>"
-    note = (
-        "<p class='soft'>▲ deviates by more than two standard uncertainties u. "
-        "Parameters fixed by convention are left out.</p>"
-    )
-    return block(f"<table>{head}{rows}</table>{note}", "table2")
 
 
 def _plot(gui: viser.GuiApi, figure: go.Figure) -> viser.GuiPlotlyHandle:
