@@ -200,8 +200,8 @@ class _Search:
         for first in range(0, len(rows), CHUNK):
             chunk = rows[first : first + CHUNK]
             starts, there = table.starts(self._poses[chunk], effort)
-            for k in range(effort.starts):
-                self._start(chunk[there[:, k]], starts[there[:, k], k], effort.steps, effort.bent)
+            pose, start = np.nonzero(there)
+            self._start(chunk[pose], starts[pose, start], effort.steps, effort.bent)
 
     def finish(self) -> None:
         """Go on where a pose was almost reached and nothing better was found."""
@@ -215,19 +215,23 @@ class _Search:
         return JointSolutions(outcome, self._net, commanded, self._robot.excess(commanded), *errors)
 
     def _start(self, rows: np.ndarray, free: Array, steps: int, bent: bool) -> None:
-        """Start poses once, and keep what is better than what was there."""
+        """Start poses, each any number of times, and keep what is better than what was there."""
         if len(rows) == 0:
             return
         end = approach(self._robot, self._poses[rows], free, steps, bent)
         self._remember_almost(rows, end)
         net = in_limits(self._robot, self._robot.net(end.free), self._near[rows])
         grade, cost = self._graded(rows, net, end)
+        best = _first_of_each(rows, np.lexsort((cost, grade, rows)))
+        rows, net, grade, cost = rows[best], net[best], grade[best], cost[best]
         better = (grade < self._grade[rows]) | ((grade == self._grade[rows]) & (cost < self._cost[rows]))
         kept = rows[better]
         self._net[kept], self._grade[kept], self._cost[kept] = net[better], grade[better], cost[better]
 
     def _remember_almost(self, rows: np.ndarray, end: Approach) -> None:
-        nearer = ~end.reached & (end.misfit < self._almost[rows])
+        missed = np.where(end.reached, np.inf, end.misfit)
+        best = _first_of_each(rows, np.lexsort((missed, rows)))
+        nearer = best[missed[best] < self._almost[rows[best]]]
         self._almost[rows[nearer]], self._almost_free[rows[nearer]] = end.misfit[nearer], end.free[nearer]
 
     def _graded(self, rows: np.ndarray, net: Array, end: Approach) -> tuple[np.ndarray, Array]:
@@ -247,6 +251,12 @@ class _Search:
         missing = misfits(self._robot, chain_state(self._robot, net), wanted)
         position, rotation = np.linalg.norm(missing[:3], axis=0), np.linalg.norm(missing[3:], axis=0)
         return position * self._robot.reach_m, rotation / self._robot.turn_weight
+
+
+def _first_of_each(rows: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """Of an order by rows the first of every row."""
+    sorted_rows = rows[order]
+    return order[np.concatenate([[True], sorted_rows[1:] != sorted_rows[:-1]])]
 
 
 def _found(robot: DrivenRobot, poses: Array, limited: bool, effort: Effort) -> tuple[np.ndarray, Array]:

@@ -1,4 +1,4 @@
-"""``python -m tests.benchmarks axes|speed``: a table in Markdown, the same numbers every time but for the clock."""
+"""``python -m tests.benchmarks axes|speed|poses``: a table in Markdown, the same numbers every time but for times."""
 
 import os
 
@@ -12,13 +12,18 @@ import argparse  # noqa: E402
 def main() -> None:
     """Print the table that was asked for."""
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
-    parser.add_argument("what", choices=("axes", "speed"))
+    parser.add_argument("what", choices=("axes", "speed", "poses"))
     parser.add_argument("--sweeps", type=int, default=4000, help="simulated sweeps for each row of 'axes'")
+    parser.add_argument("--poses", type=int, default=100_000, help="random poses for 'poses'")
     asked = parser.parse_args()
     if asked.what == "axes":
         from tests.benchmarks.axis_efficiency import table
 
         print(table(asked.sweeps))
+    elif asked.what == "poses":
+        from tests.benchmarks.compensation_speed import report as of_poses
+
+        print(of_poses(asked.poses))
     else:
         from tests.benchmarks.axis_speed import report
 
