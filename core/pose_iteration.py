@@ -1,11 +1,11 @@
 """Thousands of poses at once brought to where they are wanted, by damped least squares with the analytic Jacobian.
 
 The misfit of a pose is a vector of six: the way that is missing, in units of the arm's reach, and the rotation vector
-that is missing (weighed less for an arm that cannot take every orientation). Each pose has its own damping: a step that brings the tool nearer is taken and the damping falls, any
-other is refused and it grows (Levenberg 1944, doi 10.1090/qam/10666; Marquardt 1963, doi 10.1137/0111030). It goes with
-the square of the misfit, so that it leaves the last steps alone (Yamashita and Fukushima 2001, doi
-10.1007/978-3-7091-6217-0_18), even next to a singular pose. It grows faster from refusal to
-refusal (Nielsen 1999, IMM-REP-1999-05), so that a pose out of reach is given up soon.
+that is missing (weighed less for an arm that cannot take every orientation). Each pose has its own damping: a step
+that brings the tool nearer is taken and the damping falls, any other is refused and it grows (Levenberg 1944, doi
+10.1090/qam/10666; Marquardt 1963, doi 10.1137/0111030). It goes with the square of the misfit, so that it leaves the
+last steps alone (Yamashita and Fukushima 2001, doi 10.1007/978-3-7091-6217-0_18), even next to a singular pose. It
+grows faster from refusal to refusal (Nielsen 1999, IMM-REP-1999-05), so that a pose out of reach is given up soon.
 
 Next to a singular pose the way down is a bent valley, in which straight steps have to be short. There a second
 derivative along the step bends it (geodesic acceleration: Transtrum and Sethna 2012, arXiv:1201.5885), at the price of
