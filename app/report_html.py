@@ -23,7 +23,7 @@ from app.report_tables import (
     shown_zeros,
 )
 from app.report_words import CONVENTIONS, TERMS, facts, key_numbers
-from core.calibration import Calibration
+from core.calibration import APART, Calibration
 from core.function_fit import FunctionFit
 from core.wording import as_sentence, decimals_for, display_unit, fixed, is_simulated, joint_list, summary, two_digits
 
@@ -186,6 +186,8 @@ def _left_out(calibration: Calibration) -> Section:
         texts.append(f"Not swept: {joint_list(calibration.not_swept)}. Nothing is known of axis and drive.")
     if calibration.not_moved:
         texts.append(f"Swept in name only: the command of {joint_list(calibration.not_moved)} never changed.")
+    if not calibration.refinement.tied:
+        texts.append(f"{APART[0].upper()}{APART[1:]}.")
     if calibration.refinement.unobservable:
         lost = calibration.refinement.unobservable
         texts.append(f"These points say nothing of {lost} combination{'s' if lost > 1 else ''} of parameters.")

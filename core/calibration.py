@@ -24,6 +24,12 @@ from core.robot import Robot
 from core.sweep_fits import SweepFits, fit_sweeps
 from core.walk_from_base import SweepMotion
 
+APART = (
+    "targets were not at the same place on their links in all sweeps, as an arm with lost motion leaves them; "
+    "each sweep was given places of its own, so that this does not bend the geometry"
+)
+"""What is to be said where a refinement is not tied."""
+
 
 @dataclass(frozen=True)
 class Rejection:

@@ -7,7 +7,7 @@ The same calibration gives the same text. Keys may be added, never renamed.
 import numpy as np
 
 from core.axis_json import line_record, scatter_record
-from core.calibration import Calibration
+from core.calibration import APART, Calibration
 from core.findings import Finding
 from core.geometry import Array
 from core.json_values import Json, degrees, json_text, mm, named, number, numbers, root_mean_square, transform_mm
@@ -236,6 +236,8 @@ def _notes(calibration: Calibration) -> list[str]:
         )
     elif calibration.estimate.geometry is None:
         notes.append("an arm of one joint has no frames")
+    if not calibration.refinement.tied:
+        notes.append(APART)
     if calibration.refinement.unobservable:
         notes.append(
             f"{calibration.refinement.unobservable} combinations of parameters leave no trace in these points "

@@ -8,19 +8,22 @@ is, one target serves several joints, and errors of one step no longer pass as t
     minimise  sum_j e_j' C_j^-1 e_j,       e_j = measured - predicted point            (core/arm_jacobian.py)
 
 by Gauss-Newton from the joint-by-joint start. The inverse of the information matrix is the covariance of everything,
-and goes through to the phi-model. Two guards:
+and goes through to the phi-model. Guards:
 
 - The noise is estimated anew from these residuals, so uncertainties do not rest on a data sheet.
 - Where points scatter along their arcs beyond the noise, the family of a drive's function is not the whole truth. The
   excess is added to the noise along the arcs of that joint, so that it is not forced into the geometry.
+- A target has one place on its link in all sweeps, unless the points contradict it: then each sweep has its own.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import fdtrc
 
 from core.arm import Arm, carry
-from core.arm_jacobian import ArmState, net_displacements, predict
+from core.arm_jacobian import ArmState, Prediction, net_displacements, predict
+from core.axes.result import ROUNDING_M
 from core.drives import drive_functions, offset_std
 from core.estimate import ArmEstimate
 from core.function_fit import FunctionFit
@@ -38,6 +41,10 @@ from core.walk_from_base import SweepMotion
 
 MOST_ROUNDS = 12
 """Rounds of fitting, estimating the noise and leaving out what stands out."""
+SUSPICIOUS = 3.0
+"""Standard deviations of chi-square above its mean from which the places of targets are looked into."""
+CONTRADICTED = 1e-4
+"""Chance below which targets are not held to be at one place in all sweeps."""
 SETTLED = 0.03
 """The noise is estimated anew until it changes by less than this share; its own uncertainty is no smaller."""
 
@@ -84,6 +91,8 @@ class Refinement:
     """Standard deviation of what each drive does beyond its function, rad or m, (n,)."""
     unobservable: int
     """Combinations of parameters that the points say nothing about."""
+    tied: bool
+    """False: targets were not at the same place in all sweeps, as by lost motion, and each sweep has its own."""
 
 
 def refine(
@@ -100,10 +109,9 @@ def refine(
     Raises:
         NotConverged: Gauss-Newton did not settle; the joint-by-joint estimate stands.
     """
-    problem = RefinementProblem.of(campaign, found, start)
+    problem, state, prediction, tied = _tied_or_not(campaign, found, motions, start)
     used = np.concatenate([_used(m) for m in motions]) & problem.knowable
-    state, noise, excess = problem.start_state(start), found.noise, np.zeros(campaign.robot.joint_count)
-    prediction = predict(state, problem.seen, problem.layout)
+    noise, excess = found.noise, np.zeros(campaign.robot.joint_count)
     for _ in range(MOST_ROUNDS):
         state, solved = problem.solve(state, prediction, problem.covariance(noise, excess, prediction), used)
         prediction = solved.prediction
@@ -111,7 +119,7 @@ def refine(
         growth = better.rms_m(problem.stated_m2[used]) / noise.rms_m(problem.stated_m2[used])
         settled = abs(growth - 1) < SETTLED and np.allclose(more, excess, rtol=0.05, atol=1e-9)
         noise, excess = better, more
-        worst = _worst_outlier(solved, used) if reject else None
+        worst = _worst_outlier(problem, solved, used) if reject else None
         if settled and worst is None:
             break
         if worst is not None:
@@ -130,7 +138,38 @@ def refine(
         degrees_of_freedom=solved.degrees_of_freedom,
         arc_excess=excess,
         unobservable=solved.unobservable,
+        tied=tied,
     )
+
+
+def _tied_or_not(
+    campaign: Campaign, found: SweepFits, motions: tuple[SweepMotion, ...], start: ArmEstimate
+) -> tuple[RefinementProblem, ArmState, Prediction, bool]:
+    """Let a target have one place in all sweeps, unless the points contradict that (F-test).
+
+    An arm with lost motion does not come back to the same place between sweeps. Tied together, its sweeps would bend
+    the geometry; apart, each still shows its axis and its drive.
+    """
+    solutions = []
+    for tied in (True, False):
+        problem = RefinementProblem.of(campaign, found, start, tied)
+        used = np.concatenate([_used(m) for m in motions]) & problem.knowable
+        nothing = np.zeros(campaign.robot.joint_count)
+        state = problem.start_state(start)
+        prediction = predict(state, problem.seen, problem.layout)
+        state, solved = problem.solve(state, prediction, problem.covariance(found.noise, nothing, prediction), used)
+        solutions.append((problem, state, solved.prediction, tied, solved))
+        freedom = solved.degrees_of_freedom
+        if tied and solved.chi_square < freedom * (1 + SUSPICIOUS * np.sqrt(2 / freedom)):
+            break
+    if len(solutions) == 2:
+        one, other = solutions[0][4], solutions[1][4]
+        more = one.degrees_of_freedom - other.degrees_of_freedom
+        per_place = (one.chi_square - other.chi_square) / max(more, 1)
+        scatter = other.chi_square / other.degrees_of_freedom
+        if more > 0 and fdtrc(more, other.degrees_of_freedom, max(per_place, 0.0) / scatter) < CONTRADICTED:
+            return solutions[1][:4]
+    return solutions[0][:4]
 
 
 def _estimate(
@@ -219,7 +258,7 @@ def _targets(
     rest, spread = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
     own = covariance[problem.layout.targets, problem.layout.targets]
     for k, target in enumerate(problem.targets):
-        if not np.any(used & (problem.seen.target == k)):
+        if not np.any(used & (problem.seen.target == k)) or np.isfinite(rest[target]).all():
             continue
         rest[target] = state.rest_points_m[k]
         spread[target] = own[3 * k : 3 * k + 3, 3 * k : 3 * k + 3]
@@ -267,7 +306,9 @@ def _used(motion: SweepMotion) -> np.ndarray:
     return used
 
 
-def _worst_outlier(solved: Solved, used: np.ndarray) -> int | None:
+def _worst_outlier(problem: RefinementProblem, solved: Solved, used: np.ndarray) -> int | None:
     """The row that stands out most, if any does: less than one chance in a thousand that any row would."""
     worst = int(np.argmin(np.where(used, solved.probability, 1.0)))
-    return worst if solved.probability[worst] * used.sum() < 1e-3 else None
+    stands_out = solved.probability[worst] * used.sum() < 1e-3
+    length = np.linalg.norm(problem.seen.point_m[worst] - solved.prediction.point_m[worst])
+    return worst if stands_out and length > ROUNDING_M else None

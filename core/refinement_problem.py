@@ -46,16 +46,22 @@ class RefinementProblem:
     """The joint that was swept, (m,)."""
     layout: Layout
     targets: np.ndarray
-    """Indices of the campaign's targets that are seen, (t,)."""
+    """Index of the campaign's target behind each place that is estimated, (t,)."""
     knowable: np.ndarray
     """False for points that also moved with a joint of which there is no sweep, boolean, (m,)."""
 
     @staticmethod
-    def of(campaign: Campaign, found: SweepFits, start: ArmEstimate) -> "RefinementProblem":
-        """Gather all sweeps of a campaign."""
+    def of(campaign: Campaign, found: SweepFits, start: ArmEstimate, tied: bool = True) -> "RefinementProblem":
+        """Gather all sweeps of a campaign.
+
+        Args:
+            tied: whether a target has one place on its link in all sweeps, or one of its own in each.
+        """
         sweeps = [f.sweep for f in found.fits]
         target = np.concatenate([s.target for s in sweeps])
-        targets, local = np.unique(target, return_inverse=True)
+        sweep = np.concatenate([np.full(len(s.rows), 0 if tied else k) for k, s in enumerate(sweeps)])
+        places, local = np.unique(np.stack([sweep, target]), axis=1, return_inverse=True)
+        targets, local = places[1], local.ravel()
         asked = np.concatenate([active_from_zero(campaign, s.commanded)[s.stop] for s in sweeps])
         swept = np.isin(np.arange(1, campaign.robot.joint_count + 1), found.swept)
         asked[:, ~swept] = 0.0

@@ -7,6 +7,9 @@ from scipy.special import fdtrc, gammaincc
 
 from core.geometry import Array, Line
 
+ROUNDING_M = 1e-9
+"""Residuals below this are rounding of coordinates, whatever their pattern."""
+
 
 @dataclass(frozen=True)
 class AxisFit:
@@ -77,7 +80,8 @@ class AxisFit:
     @property
     def outliers(self) -> np.ndarray:
         """Points that stand out: less than one chance in a thousand that any point of the sweep would, (k,)."""
-        return self.outlier_probability * len(self.used) < 1e-3
+        square = self.axial_m**2 + self.radial_m**2 + self.tangential_m**2
+        return (self.outlier_probability * len(self.used) < 1e-3) & (square > ROUNDING_M**2)
 
 
 def outlier_probabilities(square: Array, freedom: Array, total: float, degrees_of_freedom: float) -> Array:

@@ -234,3 +234,27 @@ def test_one_gross_error_anywhere_is_found_and_nothing_else(noisy, row, size_m):
     points[row] += np.array([0.6, -0.6, 0.5]) * size_m
     found = calibrate(with_points(noisy, points))
     assert [r.record for r in found.rejected] == [int(noisy.measurements.record[row])]
+
+
+def test_lost_motion_between_sweeps_does_not_bend_the_geometry():
+    """Backlash of joint 3 leaves link 3 at another place in each sweep; lengths must not pay for it."""
+    effect = parse_effect("backlash:3:0.2deg", irb_l6.cell().robot)
+    for noise in (SILENT, Noise()):
+        found, true = calibrate(simulate_campaign(5, noise=noise, effects=(effect,))), truth()
+        assert not found.refinement.tied
+        error = found.estimate.geometry.model.parameters - true.phi.parameters
+        # Half the lost motion is a zero offset of joint 3, which moves axis 4 sideways; nothing else may change.
+        error[2, 1] += 0.5 * np.deg2rad(0.2) * 0.6727
+        if noise is SILENT:
+            assert np.abs(error).max() < 5e-5
+        else:
+            std = found.estimate.geometry.std
+            assert np.sqrt(np.mean((error[std > 0] / std[std > 0]) ** 2)) < 1.6
+
+
+def test_sweeps_that_agree_share_the_places_of_targets(noisy):
+    assert all(calibrate(simulate_campaign(seed)).refinement.tied for seed in range(30))
+
+
+def test_rounding_is_never_rejected():
+    assert calibrate(simulate_campaign(1, noise=SILENT)).rejected == ()
