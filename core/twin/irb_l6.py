@@ -9,6 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from core.geometry import apply, invert
 from core.measurements import Target
 from core.phi_model import frames
 from core.theodolite import Theodolite
@@ -85,6 +86,15 @@ def theodolites() -> TheodolitePair:
     return TheodolitePair(left, right, sigma_m=0.00011)
 
 
+def targets_of(true: Truth) -> tuple[Target, ...]:
+    """The targets; of those on the end-effector the places are known, as of a tool that was measured by itself."""
+    places = apply(invert(true.frames_at_rest()[-1]), true.rest_points_m)
+    return tuple(
+        Target(name, link, tuple(round(float(v), 9) for v in place) if link == len(TURNING) else None)
+        for (name, link, _), place in zip(TARGETS, places, strict=True)
+    )
+
+
 @lru_cache
 def cell() -> Cell:
     """The whole simulated cell."""
@@ -94,7 +104,7 @@ def cell() -> Cell:
         robot=nominal_robot(),
         nominal=nominal_model(),
         truth=true,
-        targets=tuple(Target(name, link) for name, link, _ in TARGETS),
+        targets=targets_of(true),
         protocol=protocol(),
         instrument=theodolites(),
         repeatability=REPEATABILITY,

@@ -24,7 +24,9 @@ def cell(which: str) -> Cell:
 
 @cache
 def campaign(which: str = "l6", noise: Noise = EXACT, seed: int = 1) -> Campaign:
-    return simulate_campaign(seed, cell(which), noise)
+    """A campaign that states no target's place; ``with_known_targets`` states them."""
+    found = simulate_campaign(seed, cell(which), noise)
+    return replace(found, targets=tuple(replace(target, point_m=None) for target in found.targets))
 
 
 @cache
