@@ -107,7 +107,8 @@ class Dashboard:
         """Close server, worker and session."""
         self.bench.stop()
         self.jobs.close()
-        self.server.stop()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.server.stop()
         self.bench.session.close()
 
     def _darken(self, dark: bool) -> None:
