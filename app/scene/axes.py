@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.scene.colours import FITTED_AXIS, HIGHLIGHT, NOMINAL_AXIS, Rgb, round_down
+from app.scene.group import SceneGroup, add_solid
 from app.scene.poses import link_motions, pose_of, together
 from app.scene.solids import Solid, arrow, lathe
 from core.geometry import Array, Line
@@ -81,7 +82,7 @@ def tube_exaggeration(marks: tuple[AxisMark, ...], length_m: float, widest_m: fl
     return max(round_down(widest_m / max([*widest, 1e-12])), 1.0) if widest else 1.0
 
 
-class AxesView:
+class AxesView(SceneGroup):
     """Axes of one arm that follow its motion: nodes ``root/1`` .. ``root/n`` with ``arrow``, ``tube``, ``label``."""
 
     def __init__(
@@ -96,11 +97,11 @@ class AxesView:
         exaggeration: float = 1.0,
     ) -> None:
         """Draw the axes of joints 1..n, in that order, as they are with all joints at zero."""
-        self._scene, self._root, self._colour = scene, root, colour
+        super().__init__(scene, root)
+        self._colour = colour
         self._length, self._radius, self._exaggeration = length_m, radius_m, exaggeration
         self._marks, self._sliding = tuple(marks), np.asarray(sliding, dtype=bool)
         self._lit: int | None = None
-        self._top = scene.add_frame(root, show_axes=False)
         self._nodes = [self._node(mark) for mark in marks]
         self._shafts = [self._arrow(mark, colour, radius_m) for mark in marks]
         self._labels = [self._label(mark) for mark in marks if mark.text]
@@ -136,14 +137,6 @@ class AxesView:
             self._draw_tubes()
 
     @property
-    def visible(self) -> bool:
-        return self._top.visible
-
-    @visible.setter
-    def visible(self, visible: bool) -> None:
-        self._top.visible = visible
-
-    @property
     def labels_visible(self) -> bool:
         return all(label.visible for label in self._labels)
 
@@ -151,10 +144,6 @@ class AxesView:
     def labels_visible(self, visible: bool) -> None:
         for label in self._labels:
             label.visible = visible
-
-    def remove(self) -> None:
-        """Take the axes out of the scene."""
-        self._top.remove()
 
     def _node(self, mark: AxisMark) -> "viser.FrameHandle":
         return self._scene.add_frame(f"{self._root}/{mark.joint}", show_axes=False, position=mark.middle_m)
@@ -177,16 +166,8 @@ class AxesView:
         ]
 
     def _mesh(self, mark: AxisMark, part: str, solid: Solid, colour: Rgb, opacity: float | None) -> "viser.MeshHandle":
-        return self._scene.add_mesh_simple(
-            f"{self._root}/{mark.joint}/{part}",
-            solid.vertices_m,
-            solid.faces,
-            color=colour,
-            opacity=opacity,
-            side="double" if opacity else "front",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        name = f"{self._root}/{mark.joint}/{part}"
+        return add_solid(self._scene, name, solid, colour, opacity, side="double" if opacity else "front")
 
 
 def nominal_axes(

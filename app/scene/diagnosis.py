@@ -9,6 +9,7 @@ from app.scene.cameras import UP, Camera, around, near
 from app.scene.colours import BLUE, FITTED_AXIS, GREY, HIGHLIGHT, NOMINAL_AXIS, VERMILLION, Rgb
 from app.scene.dimensions import Dimension, FrameSketch, dimensions, sketches
 from app.scene.error_vectors import factor_text
+from app.scene.group import SceneGroup, add_solid
 from app.scene.poses import together
 from app.scene.solids import Solid, arrow, ball, merged
 from core.estimate import Geometry
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     import viser
 
 
-class DiagnosisView:
+class DiagnosisView(SceneGroup):
     """Nodes ``root/nominal``, ``root/actual``, ``root/phi_frames``, ``root/dimensions/F_P`` and ``root/factor``.
 
     ``root/dimensions/2_a_m`` is the dimension of parameter a of frame 2, with its label beside it.
@@ -48,12 +49,12 @@ class DiagnosisView:
             direction: from the arm to the eye, (3,), for which labels are laid out.
             root: name of the node that holds it all.
         """
+        super().__init__(scene, root)
         self.direction = np.asarray(direction, dtype=float)
-        self._scene, self._root, self._reach = scene, root, reach_m
+        self._reach = reach_m
         self._models = (nominal, geometry, base)
         self._exaggeration = exaggeration
         self._lit: tuple[int, str] | None = None
-        self._top = scene.add_frame(root, show_axes=False)
         self.dimensions: tuple[Dimension, ...] = ()
         self._labels: dict[tuple[int, str], viser.LabelHandle] = {}
         self._draw()
@@ -67,14 +68,6 @@ class DiagnosisView:
     def exaggeration(self, factor: float) -> None:
         self._exaggeration = factor
         self._draw()
-
-    @property
-    def visible(self) -> bool:
-        return self._top.visible
-
-    @visible.setter
-    def visible(self, visible: bool) -> None:
-        self._top.visible = visible
 
     def highlight(self, frame: int | None, parameter: str = "") -> None:
         """Draw one dimension in the colour of attention, with its label; None: none."""
@@ -100,10 +93,6 @@ class DiagnosisView:
                 size = max(0.22 * self._reach, 1.4 * float(np.linalg.norm(d.to_m - d.from_m)))
                 return near(d.text, d.middle_m, self.direction, size)
         raise KeyError(f"frame {frame} has no dimension {parameter}")
-
-    def remove(self) -> None:
-        """Take the drawing out of the scene."""
-        self._top.remove()
 
     def _draw(self) -> None:
         drawn = sketches(*self._models, self._exaggeration)
@@ -178,14 +167,7 @@ class DiagnosisView:
         return self._scene.add_label(full, text, position=place, anchor="center-center", visible=shown)
 
     def _mesh(self, name: str, solid: Solid, colour: Rgb) -> None:
-        self._scene.add_mesh_simple(
-            f"{self._root}/{name}",
-            solid.vertices_m,
-            solid.faces,
-            color=colour,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        add_solid(self._scene, f"{self._root}/{name}", solid, colour)
 
 
 def label_places(drawn: tuple[Dimension, ...], height_m: float, width_m: float, direction: Array) -> Array:

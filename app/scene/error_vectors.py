@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.scene.colours import ERROR_VECTOR, Rgb
+from app.scene.group import SceneGroup, add_solid
 from app.scene.poses import together
 from app.scene.solids import Solid, arrow, merged
 from core.geometry import Array
@@ -38,14 +39,14 @@ def factor_text(magnification: float) -> str:
     return f"\N{MULTIPLICATION SIGN} {magnification:g}"
 
 
-class ErrorVectors:
+class ErrorVectors(SceneGroup):
     """Nodes ``root/arrows`` and ``root/factor``."""
 
     def __init__(
         self, scene: "viser.SceneApi", root: str = "/errors", magnification: float = 200.0, colour: Rgb = ERROR_VECTOR
     ) -> None:
-        self._scene, self._root, self._colour, self._magnification = scene, root, colour, magnification
-        self._top = scene.add_frame(root, show_axes=False)
+        super().__init__(scene, root)
+        self._colour, self._magnification = colour, magnification
         self._measured, self._predicted = np.zeros((0, 3)), np.zeros((0, 3))
         self._label_m = np.zeros(3)
         self._drawn: list[viser.SceneNodeHandle] = []
@@ -65,14 +66,6 @@ class ErrorVectors:
         self._magnification = factor
         self._draw()
 
-    @property
-    def visible(self) -> bool:
-        return self._top.visible
-
-    @visible.setter
-    def visible(self, visible: bool) -> None:
-        self._top.visible = visible
-
     def _draw(self) -> None:
         solid = arrows(magnified_ends(self._measured, self._predicted, self._magnification))
         with together(self._scene):
@@ -82,14 +75,7 @@ class ErrorVectors:
                 self._drawn = []
                 return
             text = f"errors {factor_text(self._magnification)}"
-            mesh = self._scene.add_mesh_simple(
-                f"{self._root}/arrows",
-                solid.vertices_m,
-                solid.faces,
-                color=self._colour,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
+            mesh = add_solid(self._scene, f"{self._root}/arrows", solid, self._colour)
             label = self._scene.add_label(
                 f"{self._root}/factor", text, position=self._label_m, anchor="bottom-center", font_screen_scale=1.1
             )

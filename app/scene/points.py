@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.scene.colours import EXCLUDED, HIGHLIGHT, Bytes
+from app.scene.group import SceneGroup, add_solid
 from app.scene.poses import together, turning_to
 from app.scene.solids import Solid, ball, merged, octahedron, ring
 from core.geometry import Array
@@ -61,12 +62,12 @@ def cage(radius_m: float) -> Solid:
     return merged([ring(np.zeros(3), axis, radius_m, thickness, 16) for axis in np.eye(3)])
 
 
-class PointsView:
+class PointsView(SceneGroup):
     """Nodes ``root/kept``, ``root/doubtful``, ``root/excluded``, ``root/last``, ``root/next``."""
 
     def __init__(self, scene: "viser.SceneApi", root: str = "/points", radius_m: float = 0.011) -> None:
-        self._scene, self._root, self._radius = scene, root, radius_m
-        self._top = scene.add_frame(root, show_axes=False)
+        super().__init__(scene, root)
+        self._radius = radius_m
         self._on_click: OnClick | None = None
         self._solids = {
             Verdict.KEPT: ball(np.zeros(3), radius_m, 8),
@@ -94,18 +95,6 @@ class PointsView:
         """Show where the next target is expected, (3,), as a ring square to a unit vector; None: nowhere."""
         self._put(self._next, point_m)
         self._next.wxyz = turning_to(facing)
-
-    @property
-    def visible(self) -> bool:
-        return self._top.visible
-
-    @visible.setter
-    def visible(self, visible: bool) -> None:
-        self._top.visible = visible
-
-    def remove(self) -> None:
-        """Take the points out of the scene."""
-        self._top.remove()
 
     def _batch(self, verdict: Verdict, solid: Solid, marks: PointMarks) -> None:
         name, count = f"{self._root}/{verdict.name.lower()}", len(marks.row)
@@ -152,16 +141,7 @@ class PointsView:
         return node
 
     def _mark(self, part: str, solid: Solid, opacity: float | None) -> "viser.MeshHandle":
-        return self._scene.add_mesh_simple(
-            f"{self._root}/{part}",
-            solid.vertices_m,
-            solid.faces,
-            color=HIGHLIGHT,
-            opacity=opacity,
-            visible="/" in part,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        return add_solid(self._scene, f"{self._root}/{part}", solid, HIGHLIGHT, opacity, visible="/" in part)
 
     @staticmethod
     def _put(node: "viser.SceneNodeHandle", point_m: ArrayLike | None) -> None:

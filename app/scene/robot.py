@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.scene.colours import ARM, Rgb, shaded
+from app.scene.group import SceneGroup, add_solid
 from app.scene.link_shapes import Skeleton, link_shapes, skeleton
 from app.scene.linkage import linkages
 from app.scene.poses import link_motions, pose_of, together
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     import viser
 
 
-class RobotView:
+class RobotView(SceneGroup):
     """One arm: nodes ``root/link0`` .. ``root/linkN`` (frames that move) with ``body`` and ``joint`` in each.
 
     The node of a link stands where the link's joint is met; at rest it is not turned. A point p that rides on link k
@@ -52,12 +53,12 @@ class RobotView:
             tool_m: the tool's point with all joints at zero, (3,).
             swell_m: added to all radii: a ghost must not flicker with the arm that it surrounds.
         """
-        self.axes, self.sliding, self.root = tuple(axes), np.asarray(sliding, dtype=bool), root
+        super().__init__(scene, root)
+        self.axes, self.sliding = tuple(axes), np.asarray(sliding, dtype=bool)
         self.bones: Skeleton = skeleton(self.axes, self.sliding, floor_m, tool_m)
         self.linkages = linkages(self.bones, couplings)
         self.net = np.zeros(len(self.axes))
-        self._scene, self._opacity = scene, opacity
-        self._top = scene.add_frame(root, show_axes=False)
+        self._opacity = opacity
         self._origins = np.vstack([self.bones.base_m, self.bones.hubs_m])
         self._links = [self._frame(f"{root}/link{k}", origin) for k, origin in enumerate(self._origins)]
         self._pieces: list[viser.MeshHandle] = []
@@ -81,14 +82,6 @@ class RobotView:
                 self._put(rod, linkage.rod_motion(motions, self.net), linkage.crank_m)
 
     @property
-    def visible(self) -> bool:
-        return self._top.visible
-
-    @visible.setter
-    def visible(self, visible: bool) -> None:
-        self._top.visible = visible
-
-    @property
     def opacity(self) -> float | None:
         """0..1, None: solid."""
         return self._opacity
@@ -102,7 +95,7 @@ class RobotView:
 
     def link_node(self, link: int) -> str:
         """Name of the node that moves with a link, 0..n."""
-        return f"{self.root}/link{link}"
+        return f"{self._root}/link{link}"
 
     def origin_m(self, link: int) -> Array:
         """Where the node of a link, 0..n, stands with all joints at zero, (3,)."""
@@ -112,10 +105,6 @@ class RobotView:
         """Where the tool's point is now, (3,)."""
         motion = link_motions(self.axes, self.sliding, self.net)[-1]
         return motion[:3, :3] @ self.bones.tool_m + motion[:3, 3]
-
-    def remove(self) -> None:
-        """Take the arm out of the scene."""
-        self._top.remove()
 
     def _frame(self, name: str, position: Array) -> "viser.FrameHandle":
         return self._scene.add_frame(name, show_axes=False, position=position)
@@ -128,26 +117,15 @@ class RobotView:
     def _draw_linkages(self, colour: Rgb) -> None:
         for linkage in self.linkages:
             i, at = linkage.source, linkage.crank_m
-            self._cranks.append(self._frame(f"{self.root}/crank{i}", at))
-            self._rods.append(self._frame(f"{self.root}/rod{i}", at))
-            self._add(f"{self.root}/crank{i}/body", linkage.crank().about(at), colour)
-            self._add(f"{self.root}/rod{i}/body", linkage.rod().about(at), colour)
+            self._cranks.append(self._frame(f"{self._root}/crank{i}", at))
+            self._rods.append(self._frame(f"{self._root}/rod{i}", at))
+            self._add(f"{self._root}/crank{i}/body", linkage.crank().about(at), colour)
+            self._add(f"{self._root}/rod{i}/body", linkage.rod().about(at), colour)
             self._add(f"{self.link_node(i + 1)}/lever", linkage.lever().about(self._origins[i + 1]), colour)
 
     def _add(self, name: str, solid: Solid, colour: Rgb) -> None:
-        if len(solid.faces) == 0:
-            return
-        self._pieces.append(
-            self._scene.add_mesh_simple(
-                name,
-                solid.vertices_m,
-                solid.faces,
-                color=colour,
-                opacity=self._opacity,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
-        )
+        if len(solid.faces) > 0:
+            self._pieces.append(add_solid(self._scene, name, solid, colour, self._opacity))
 
     @staticmethod
     def _put(node: "viser.FrameHandle", motion: Array, origin_m: Array) -> None:

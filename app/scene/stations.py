@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from app.scene.colours import GREY, INSTRUMENT, SIGHT_LINE, shaded
+from app.scene.group import SceneGroup, add_solid
 from app.scene.poses import together
 from app.scene.solids import Solid, barrel, merged, tube
 from core.geometry import Array
@@ -61,14 +62,14 @@ def aiming(position_m: ArrayLike, point_m: ArrayLike) -> tuple[Array, Array]:
     return turn, Rotation.from_euler("x", np.arctan2(z, level)).as_quat(scalar_first=True)
 
 
-class StationsView:
+class StationsView(SceneGroup):
     """Nodes ``root/0``, ``root/1``.. with ``tripod``, ``head``, ``head/telescope``, ``label``, and ``root/sights``."""
 
     def __init__(
         self, scene: "viser.SceneApi", stations: tuple[Station, ...], floor_m: float, root: str = "/stations"
     ) -> None:
-        self._scene, self._root, self._stations = scene, root, stations
-        self._top = scene.add_frame(root, show_axes=False)
+        super().__init__(scene, root)
+        self._stations = stations
         self._heads = [self._station(k, station, floor_m) for k, station in enumerate(stations)]
         self._sights: viser.LineSegmentsHandle | None = None
 
@@ -90,26 +91,13 @@ class StationsView:
             else:
                 self._sights.points = lines.astype(np.float32)
 
-    @property
-    def visible(self) -> bool:
-        return self._top.visible
-
-    @visible.setter
-    def visible(self, visible: bool) -> None:
-        self._top.visible = visible
-
     def _station(self, k: int, station: Station, floor_m: float) -> tuple["viser.FrameHandle", "viser.FrameHandle"]:
         root = f"{self._root}/{k}"
         self._scene.add_frame(root, show_axes=False, position=station.position_m)
-        self._mesh(f"{root}/tripod", tripod(max(float(station.position_m[2]) - floor_m, 0.25)), GREY)
+        add_solid(self._scene, f"{root}/tripod", tripod(max(float(station.position_m[2]) - floor_m, 0.25)), GREY)
         head = self._scene.add_frame(f"{root}/head", show_axes=False)
-        self._mesh(f"{root}/head/body", alidade(), INSTRUMENT)
+        add_solid(self._scene, f"{root}/head/body", alidade(), INSTRUMENT)
         scope = self._scene.add_frame(f"{root}/head/telescope", show_axes=False)
-        self._mesh(f"{root}/head/telescope/body", telescope(), shaded(GREY, 0.5))
+        add_solid(self._scene, f"{root}/head/telescope/body", telescope(), shaded(GREY, 0.5))
         self._scene.add_label(f"{root}/label", station.name[:32], position=(0, 0, 0.14), anchor="bottom-center")
         return head, scope
-
-    def _mesh(self, name: str, solid: Solid, colour: tuple[int, int, int]) -> None:
-        self._scene.add_mesh_simple(
-            name, solid.vertices_m, solid.faces, color=colour, cast_shadow=False, receive_shadow=False
-        )

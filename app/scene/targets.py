@@ -4,10 +4,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.scene.colours import GREEN, GREY, HIGHLIGHT, Rgb
+from app.scene.colours import GREEN, GREY, HIGHLIGHT
+from app.scene.group import add_solid
 from app.scene.link_shapes import Skeleton
 from app.scene.robot import RobotView
-from app.scene.solids import Solid, ball, tube
+from app.scene.solids import ball, tube
 from core.geometry import Array
 from core.measurements import Target
 
@@ -61,7 +62,7 @@ class TargetsView:
         """Draw one target, by its index, in the colour of attention; None: none."""
         for k, (name, _) in list(self._balls.items()):
             colour, radius = (HIGHLIGHT, 1.5 * self._radius) if k == index else (GREEN, self._radius)
-            self._balls[k] = (name, self._mesh(name, ball(np.zeros(3), radius), colour))
+            self._balls[k] = (name, add_solid(self._scene, name, ball(np.zeros(3), radius), colour))
 
     @property
     def labels_visible(self) -> bool:
@@ -75,17 +76,13 @@ class TargetsView:
     def _draw(self, k: int, target: Target, point: Array, robot: RobotView) -> None:
         root = f"{robot.link_node(target.link)}/target{k}"
         self._scene.add_frame(root, show_axes=False, position=point - robot.origin_m(target.link))
-        self._balls[k] = (f"{root}/ball", self._mesh(f"{root}/ball", ball(np.zeros(3), self._radius), GREEN))
+        name = f"{root}/ball"
+        self._balls[k] = (name, add_solid(self._scene, name, ball(np.zeros(3), self._radius), GREEN))
         foot = foot_on_link(robot.bones, target.link, point) - point
         if np.linalg.norm(foot) > self._radius:
-            self._mesh(f"{root}/stalk", tube(foot, np.zeros(3), 0.007, 0.004, 8), GREY)
+            add_solid(self._scene, f"{root}/stalk", tube(foot, np.zeros(3), 0.007, 0.004, 8), GREY)
         text = target.name if len(target.name) <= LONGEST_NAME else f"{target.name[: LONGEST_NAME - 1]}…"
         above = (0.0, 0.0, 1.4 * self._radius)
         self._labels.append(
             self._scene.add_label(f"{root}/label", text, position=above, anchor="bottom-center", font_screen_scale=0.95)
-        )
-
-    def _mesh(self, name: str, solid: Solid, colour: Rgb) -> "viser.MeshHandle":
-        return self._scene.add_mesh_simple(
-            name, solid.vertices_m, solid.faces, color=colour, cast_shadow=False, receive_shadow=False
         )

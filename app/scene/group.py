@@ -1,0 +1,54 @@
+"""What is drawn under one node, and shown, hidden and removed as one; and solids as meshes without shadows."""
+
+from typing import TYPE_CHECKING, Literal
+
+from app.scene.colours import Rgb
+from app.scene.solids import Solid
+
+if TYPE_CHECKING:
+    import viser
+
+
+class SceneGroup:
+    """A node ``root`` that holds all that its subclass draws."""
+
+    def __init__(self, scene: "viser.SceneApi", root: str) -> None:
+        self._scene, self._root = scene, root
+        self._top = scene.add_frame(root, show_axes=False)
+
+    @property
+    def visible(self) -> bool:
+        return self._top.visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        self._top.visible = visible
+
+    def remove(self) -> None:
+        """Take all of it out of the scene."""
+        self._top.remove()
+
+
+def add_solid(
+    scene: "viser.SceneApi",
+    name: str,
+    solid: Solid,
+    colour: Rgb,
+    opacity: float | None = None,
+    *,
+    side: Literal["front", "double"] = "front",
+    visible: bool = True,
+) -> "viser.MeshHandle":
+    """Draw a solid as the node of this name, which it replaces; ``opacity`` 0..1, None: opaque."""
+    return scene.add_mesh_simple(
+        name,
+        solid.vertices_m,
+        solid.faces,
+        color=colour,
+        opacity=opacity,
+        side=side,
+        visible=visible,
+        # Shadows cost software renderers more than all the rest.
+        cast_shadow=False,
+        receive_shadow=False,
+    )
