@@ -6,32 +6,22 @@ from pathlib import Path
 import numpy as np
 
 from core.errors import InputError
+from core.file_records import HUGE, FileRecord
 from core.geometry import Array
-from core.input_files import one_line, read_text, shown
-from core.toml_records import HUGE
+from core.input_files import one_line, read_text
 
 LIMIT_BYTES = 64_000_000
 
 
-class JsonRecord:
+class JsonRecord(FileRecord):
     """One object of a JSON file, with its place for messages."""
 
     def __init__(self, values: dict, path: Path, place: str = "") -> None:
-        self._values, self._path, self._place = values, path, place
+        super().__init__(values, path, place, InputError)
 
     def __contains__(self, key: str) -> bool:
         """Whether there is such a key with something else than null."""
         return self._values.get(key) is not None
-
-    def wrong(self, key: str, expected: str) -> InputError:
-        """The error for a key whose value cannot be used."""
-        name = self._name(key)
-        said = f"{name} = {shown(self._values[key])}" if key in self._values else f"{name} is missing"
-        return InputError(f"{self._path}: {said}, expected {expected}")
-
-    def failed(self, message: str) -> InputError:
-        """The error for the record as a whole."""
-        return InputError(f"{self._path}: {self._place + ': ' if self._place else ''}{message}")
 
     def text(self, key: str) -> str:
         """A string on one line."""
@@ -52,13 +42,6 @@ class JsonRecord:
         value = self._values.get(key)
         if not isinstance(value, bool):
             raise self.wrong(key, "true or false")
-        return value
-
-    def integer(self, key: str) -> int:
-        """A whole number."""
-        value = self._values.get(key)
-        if isinstance(value, bool) or not isinstance(value, int) or abs(value) > HUGE:
-            raise self.wrong(key, "a whole number")
         return value
 
     def number(self, key: str) -> float:

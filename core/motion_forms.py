@@ -147,20 +147,29 @@ class Harmonics(MotionForm):
 
 
 @dataclass(frozen=True)
-class DriveGear(MotionForm):
-    """An eccentric gear before the last reduction N: once a turn of the gear, N joint turns apart."""
+class Gear(MotionForm):
+    """An eccentric wheel of a gear of known ratio: its first harmonic, s and c."""
 
     ratio: float
-    """Turns of the joint for one turn of the gear, N."""
+    """N, the sense of which the formula tells."""
     name = "gear"
     coefficient_names = ("s", "c")
-    formula = "x + N (s sin(x/N) + c cos(x/N))"
 
     def start(self) -> Array:
         return np.zeros(2)
 
     def prior_std(self) -> Array:
         return np.full(2, PERIODIC_STD_RAD)
+
+    def constants(self) -> dict[str, float]:
+        return {"N": self.ratio}
+
+
+@dataclass(frozen=True)
+class DriveGear(Gear):
+    """An eccentric gear before the last reduction N: once a turn of the gear, ``ratio`` joint turns apart."""
+
+    formula = "x + N (s sin(x/N) + c cos(x/N))"
 
     def evaluate(self, x: Array, coefficients: Array) -> tuple[Array, Array, Array]:
         sine, cosine = np.sin(x / self.ratio), np.cos(x / self.ratio)
@@ -168,33 +177,18 @@ class DriveGear(MotionForm):
         value = x + self.ratio * (s * sine + c * cosine)
         return value, 1.0 + s * cosine - c * sine, self.ratio * np.stack([sine, cosine], axis=1)
 
-    def constants(self) -> dict[str, float]:
-        return {"N": self.ratio}
-
 
 @dataclass(frozen=True)
-class CouplingGear(MotionForm):
+class CouplingGear(Gear):
     """Passive motion through a gear pair of ratio N with an eccentric wheel."""
 
-    ratio: float
-    name = "gear"
-    coefficient_names = ("s", "c")
     formula = "N x + s sin(N x) + c (cos(N x) - 1)"
-
-    def start(self) -> Array:
-        return np.zeros(2)
-
-    def prior_std(self) -> Array:
-        return np.full(2, PERIODIC_STD_RAD)
 
     def evaluate(self, x: Array, coefficients: Array) -> tuple[Array, Array, Array]:
         sine, cosine = np.sin(self.ratio * x), np.cos(self.ratio * x)
         s, c = coefficients
         value = self.ratio * x + s * sine + c * (cosine - 1.0)
         return value, self.ratio * (1.0 + s * cosine - c * sine), np.stack([sine, cosine - 1.0], axis=1)
-
-    def constants(self) -> dict[str, float]:
-        return {"N": self.ratio}
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from core.errors import CampaignError
+from core.file_records import HUGE
 from core.geometry import Array
 from core.input_files import InputText, read_text, shown
-from core.toml_records import HUGE
 
 LIMIT_BYTES = 64_000_000
 MOST_ROWS = 2_000_000

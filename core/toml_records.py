@@ -3,36 +3,21 @@
 import re
 import tomllib
 from collections.abc import Iterable
-from pathlib import Path
 
 from core.errors import InputError
+from core.file_records import HUGE, FileRecord
 from core.input_files import InputText, one_line, shown
 from core.units import UNIT_WORDS
 
 LIMIT_BYTES = 1_000_000
-HUGE = 1e12
-"""No honest number in a file is larger; squares of what passes cannot overflow."""
 
 # A key of thousands of dotted parts takes the parser minutes and all memory; nobody writes one.
 _PART = r"""(?:[\w\-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')"""
 _ENDLESS_KEY = re.compile(rf"(?<![\w\-\\])(?:{_PART}[ \t]*\.[ \t]*){{32}}")
 
 
-class TomlTable:
+class TomlTable(FileRecord):
     """One table of a TOML file, with its place for messages."""
-
-    def __init__(self, values: dict, path: Path, place: str, error: type[InputError]) -> None:
-        self._values, self._path, self._place, self._error = values, path, place, error
-
-    def wrong(self, key: str, expected: str) -> InputError:
-        """The error for a key whose value cannot be used."""
-        value = self._values.get(key)
-        said = f"{self._name(key)} = {shown(value)}" if key in self._values else f"{self._name(key)} is missing"
-        return self._error(f"{self._path}: {said}, expected {expected}")
-
-    def failed(self, message: str) -> InputError:
-        """The error for the table as a whole."""
-        return self._error(f"{self._path}: {self._place + ': ' if self._place else ''}{message}")
 
     def __contains__(self, key: str) -> bool:
         return key in self._values
@@ -84,13 +69,6 @@ class TomlTable:
         value = self._values.get(key, default)
         if not isinstance(value, bool):
             raise self.wrong(key, "true or false")
-        return value
-
-    def integer(self, key: str) -> int:
-        """A whole number."""
-        value = self._values.get(key)
-        if isinstance(value, bool) or not isinstance(value, int) or abs(value) > HUGE:
-            raise self.wrong(key, "a whole number")
         return value
 
     def number(self, key: str, default: float | None = None, low: float = -HUGE) -> float:

@@ -18,10 +18,10 @@ from math import isfinite
 import numpy as np
 
 from core.errors import RobotError
+from core.file_records import HUGE
 from core.geometry import Array, apply, perpendicular_basis, rotation_about, transform
 from core.input_files import InputText, one_line, shown
 from core.robot import Coupling, Joint, JointKind, LinkMass, Robot
-from core.toml_records import HUGE
 from core.urdf_masses import LinkInertia, UrdfJoint, lumped_masses
 
 URDF_LIMIT_BYTES = 20_000_000

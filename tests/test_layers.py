@@ -15,7 +15,7 @@ FOUNDATION = """
     core.robot core.kinematics core.measurements
 """
 FILES = """
-    core.units core.input_files core.toml_text core.toml_records core.text_table
+    core.units core.input_files core.file_records core.toml_text core.toml_records core.text_table
     core.robot_builders core.urdf_masses core.urdf core.robot_files core.robot_writer
     core.measurement_columns core.point_covariance core.measurement_checks core.measurement_table
     core.measurement_writer core.campaign_files core.campaign_writer core.points_file

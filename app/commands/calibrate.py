@@ -1,12 +1,11 @@
 """``trueaxis calibrate``: a campaign folder -> calibration.json, report.html and tables/*.csv."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from app.output import OutputFile, require_writable, write_files
 from app.progress import Progress
-from app.standard_output import print_json
+from app.standard_output import print_result
 from app.summary import calibration_summary
 from core.axes import ESTIMATORS
 from core.calibration import Calibration, calibrate
@@ -42,12 +41,7 @@ def run(arguments: argparse.Namespace) -> None:
         files = _files(calibration)
         progress.step("writing")
         write_files(arguments.out, files)
-    summary = calibration_summary(calibration, arguments.out)
-    if arguments.json:
-        print(summary, file=sys.stderr)
-        print_json(files[0].text)
-    else:
-        print(summary)
+    print_result(calibration_summary(calibration, arguments.out), files[0].text, as_json=arguments.json)
 
 
 def _files(calibration: Calibration) -> tuple[OutputFile, ...]:

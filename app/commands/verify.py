@@ -2,12 +2,11 @@
 
 import argparse
 import math
-import sys
 from pathlib import Path
 
 from app.output import OutputFile, require_writable, write_files
 from app.progress import Progress
-from app.standard_output import print_json
+from app.standard_output import print_result
 from core.calibration_file import read_calibration
 from core.campaign_files import read_campaign
 from core.verification import Limits, Verification, calibrated_verdict, verify
@@ -47,12 +46,7 @@ def run(arguments: argparse.Namespace) -> None:
         files = _files(found)
         progress.step("writing")
         write_files(arguments.out, files)
-    said = _summary(found, arguments.out)
-    if arguments.json:
-        print(said, file=sys.stderr)
-        print_json(files[0].text)
-    else:
-        print(said)
+    print_result(_summary(found, arguments.out), files[0].text, as_json=arguments.json)
 
 
 def _files(found: Verification) -> tuple[OutputFile, ...]:
