@@ -1,6 +1,6 @@
 """Events as they stand in the file: numbered, dated, signed, with a check sum, as one JSON object a row.
 
-    {"crc":"5f0c1a2b","size":"0000213","format":1,"seq":17,"utc":"2026-03-02T09:14:05.120433Z","by":"A. Name",
+    {"crc":"5f0c1a2b","size":"0000213","format":2,"seq":17,"utc":"2026-03-02T09:14:05.120433Z","by":"A. Name",
      "event":{"kind":"judged",...}}
 
 ``crc`` is the CRC-32 of the ``size`` bytes that follow the two. So an entry tells by itself whether it is intact, and
@@ -20,9 +20,16 @@ from msgspec import Meta
 from core.session_events import LONGEST_EVENT_BYTES, AnyEvent, Event, SessionError, checked, kind_of
 from core.session_values import Line, PositiveInt
 
-SESSION_FORMAT = 1
+SESSION_FORMAT = 2
 """Of the entries that this program writes; it reads all before it."""
-MIGRATIONS: dict[int, Callable[[dict], dict]] = {}
+
+
+def _unchanged(plain: dict) -> dict:
+    """Format 2 only adds: sweeps that are held elsewhere than at home."""
+    return plain
+
+
+MIGRATIONS: dict[int, Callable[[dict], dict]] = {1: _unchanged}
 """From format k to k + 1: the plain event of an entry, rewritten when it is read. Files keep what they hold."""
 
 _HEAD = re.compile(rb'\{"crc":"([0-9a-f]{8})","size":"(\d{7})",')

@@ -24,7 +24,8 @@ from core.session_events import (
     TargetsNamed,
     Titled,
 )
-from core.session_plan import PlannedSweep
+from core.session_plan import PlannedSweep, commands_for
+from core.sweep_fits import SAME_COMMAND
 from core.toml_records import LIMIT_BYTES, parse_toml
 from core.urdf import URDF_LIMIT_BYTES
 
@@ -67,20 +68,30 @@ def campaign_events(folder: Path | str) -> list[Event]:
 
 def sweeps_of(campaign: Campaign) -> tuple[PlannedSweep, ...]:
     """The sweeps that a campaign made, as a plan; those of a single stop are left to the shots."""
-    table, robot = campaign.measurements, campaign.robot
-    home = np.zeros(robot.joint_count) if campaign.home is None else campaign.home
-    motors = active_commands(robot, table.commanded) - active_commands(robot, home)
+    table = campaign.measurements
     swept = np.flatnonzero(table.phase == SWEEP)
     sweeps = []
     for joint, number in dict.fromkeys(zip(table.joint[swept].tolist(), table.sweep[swept].tolist(), strict=True)):
         rows = swept[(table.joint[swept] == joint) & (table.sweep[swept] == number)]
-        along = motors[rows, joint - 1]
-        low, high, stops = float(along.min()), float(along.max()), int(table.step[rows].max()) + 1
+        low, high, held = _range_of(campaign, joint, rows)
+        stops = int(table.step[rows].max()) + 1
         if low < high and stops > 1:
             names = tuple(dict.fromkeys(campaign.targets[k].name for k in table.target[rows]))
             both_ways = len(set(table.approach[rows, joint - 1].tolist()) - {0}) > 1
-            sweeps.append(PlannedSweep(joint, number, low, high, stops, names, both_ways))
+            sweeps.append(PlannedSweep(joint, number, low, high, stops, names, both_ways, held))
     return tuple(sweeps)
+
+
+def _range_of(campaign: Campaign, joint: int, rows: np.ndarray) -> tuple[float, float, tuple[float, ...] | None]:
+    """How far the motor of a sweep went from where it was held, and where that was; None: at home."""
+    robot, n = campaign.robot, campaign.robot.joint_count
+    home = active_commands(robot, np.zeros(n) if campaign.home is None else campaign.home)[0]
+    motors = active_commands(robot, campaign.measurements.commanded[rows])
+    still = np.where(np.arange(n) == joint - 1, home, motors[0])
+    along = motors[:, joint - 1] - still[joint - 1]
+    at_home = np.abs(still - home).max() <= SAME_COMMAND
+    held = None if at_home else tuple(commands_for(robot, still[None, :])[0].tolist())
+    return float(along.min()), float(along.max()), held
 
 
 def shots_of(campaign: Campaign) -> list[ShotTaken]:

@@ -2,7 +2,7 @@
 
 A sweep moves one motor and holds all others still (section 3.1 of the paper), so the joint that the moving motor
 drives through a linkage is commanded by its nominal passive motion. A pass starts half an interval before its first
-stop, so that every stop is reached in one sense.
+stop, or at the joint's limit, so that every stop is reached in one sense.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from core.errors import InputError
 from core.geometry import Array
 from core.kinematics import active_commands
 from core.robot import Robot
-from core.session_values import Line, Number, PositiveInt
+from core.session_values import Line, Number, Numbers, PositiveInt
 from core.units import displacement_units, from_si
 
 StepKey = tuple[int, int, int, int, str]
@@ -34,12 +34,14 @@ class PlannedSweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """1 for the first sweep of this joint."""
     low: Number
     high: Number
-    """Displacements of the motor from home, rad or m."""
+    """Displacements of the motor from where it is held, rad or m."""
     stops: Annotated[int, Meta(ge=2, le=1_000_000)]
     targets: Annotated[tuple[Line, ...], Meta(min_length=1, max_length=100)]
     """Seen at each stop; a second one, on the link before, shows the dependency."""
     both_ways: bool = False
     """Forwards, then backwards over the same stops."""
+    held: Numbers | None = None
+    """Commands about which this sweep is made, where all other joints stay, rad or m, (n,); None: home."""
 
     @property
     def shots(self) -> int:
@@ -96,6 +98,8 @@ def check_plan(robot: Robot, targets: dict[str, int], plan: Plan) -> None:
         if (row.joint, row.sweep) in seen:
             raise InputError(f"{name} stands twice, expected every sweep once")
         seen.add((row.joint, row.sweep))
+        if row.held is not None and len(row.held) != n:
+            raise InputError(f"{name} is held at {len(row.held)} values, expected {n}, one a joint of {robot.name}")
         if not row.low < row.high:
             raise InputError(f"{name} goes from {row.low:g} to {row.high:g}, expected the lower value first")
         _check_targets(name, row, targets)
@@ -104,8 +108,7 @@ def check_plan(robot: Robot, targets: dict[str, int], plan: Plan) -> None:
 
 def steps_of(robot: Robot, plan: Plan) -> tuple[Step, ...]:
     """Every shot of a plan in its order."""
-    still = _still(robot, plan)
-    return tuple(step for row in plan.sweeps for step in _sweep_steps(robot, row, still))
+    return tuple(step for row in plan.sweeps for step in _sweep_steps(robot, row, _still(robot, plan, row)))
 
 
 def commands_for(robot: Robot, motors: Array) -> Array:
@@ -130,9 +133,8 @@ def _check_targets(name: str, row: PlannedSweep, targets: dict[str, int]) -> Non
 
 def _check_limits(robot: Robot, plan: Plan) -> None:
     limits = np.array([joint.limits for joint in robot.joints])
-    still = _still(robot, plan)
     for row in plan.sweeps:
-        ends = np.stack([still, still])
+        ends = np.tile(_still(robot, plan, row), (2, 1))
         ends[:, row.joint - 1] += [row.low, row.high]
         commanded = commands_for(robot, ends)
         beyond = (commanded < limits[:, 0] - LIMIT_TOLERANCE) | (commanded > limits[:, 1] + LIMIT_TOLERANCE)
@@ -146,10 +148,10 @@ def _check_limits(robot: Robot, plan: Plan) -> None:
             )
 
 
-def _still(robot: Robot, plan: Plan) -> Array:
-    """What the motors are asked for at home, (n,)."""
-    home = np.zeros(robot.joint_count) if plan.home is None else np.array(plan.home)
-    return active_commands(robot, home)[0]
+def _still(robot: Robot, plan: Plan, row: PlannedSweep) -> Array:
+    """What the motors are asked for where a sweep is held, (n,)."""
+    held = row.held if row.held is not None else plan.home
+    return active_commands(robot, np.zeros(robot.joint_count) if held is None else np.array(held))[0]
 
 
 def _sweep_steps(robot: Robot, row: PlannedSweep, still: Array) -> list[Step]:
@@ -158,7 +160,9 @@ def _sweep_steps(robot: Robot, row: PlannedSweep, still: Array) -> list[Step]:
     places = np.linspace(row.low, row.high, row.stops)
     half = (row.high - row.low) / (row.stops - 1) / 2
     commands = [tuple(c) for c in commands_for(robot, still + places[:, None] * along).tolist()]
-    before = commands_for(robot, still + np.array([[row.low - half], [row.high + half]]) * along).tolist()
+    limits = np.array([joint.limits for joint in robot.joints])
+    beyond = commands_for(robot, still + np.array([[row.low - half], [row.high + half]]) * along)
+    before = np.clip(beyond, limits[:, 0], limits[:, 1]).tolist()
     steps = []
     for sense in (1, -1) if row.both_ways else (1,):
         start: tuple[float, ...] | None = tuple(before[0 if sense > 0 else 1])

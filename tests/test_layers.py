@@ -29,7 +29,8 @@ CALIBRATION = """
 """
 SESSIONS = """
     core.instruments core.session_robot core.session_values core.session_journal core.session_plan
-    core.session_events core.session_entries core.session_import core.session_shots core.session_state
+    core.session_events core.suggested_plan
+    core.session_entries core.session_import core.session_shots core.session_state
     core.session_lock core.session_store core.session_checks core.session_fold core.session_reader
     core.session_timeline core.session core.session_library core.session_campaign
 """

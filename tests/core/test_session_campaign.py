@@ -17,10 +17,12 @@ from core.phi_model import from_axes
 from core.robot_writer import phi_robot_toml
 from core.session import Session
 from core.session_campaign import export_campaign, open_campaign, to_campaign
-from core.session_events import Judged, SessionError, ShotTaken, Titled
+from core.session_events import Judged, Planned, SessionError, ShotTaken, Titled
+from core.session_plan import PlannedSweep
 from core.session_shots import shot_at
 from core.twin import irb_l6, scara
 from core.twin.campaign import both_ways, in_motion, simulate_campaign
+from core.twin.demo import demo_events
 
 CELLS = (irb_l6.cell(), scara.cell(), both_ways(irb_l6.cell()), in_motion(scara.cell()))
 URDF = """<robot name="two"><link name="a"/><link name="b"/><link name="c"/>
@@ -160,3 +162,17 @@ def test_a_wrong_campaign_makes_no_session(tmp_path: Path) -> None:
     with pytest.raises(CampaignError, match="T9"):
         open_campaign(tmp_path / "first", tmp_path / "a.trueaxis")
     assert not (tmp_path / "a.trueaxis").exists()
+
+
+def test_sweeps_that_were_held_elsewhere_come_back_as_a_plan_with_the_same_commands(tmp_path: Path) -> None:
+    cell = irb_l6.cell()
+    held = tuple((np.array(cell.home) + np.deg2rad([5, 10, -20, 0, 30, 0])).tolist())
+    plan = Planned((PlannedSweep(6, 1, -0.4, 0.4, 5, ("T1",), held=held),), tuple(cell.home))
+    events = [event for event in demo_events(cell) if not isinstance(event, Planned)]
+    with Session.create(tmp_path / "a.trueaxis", [*events, plan]) as session:
+        take(session, 5)
+        export_campaign(session.state, tmp_path / "campaign")
+        with open_campaign(tmp_path / "campaign", tmp_path / "b.trueaxis") as again:
+            before = np.array([step.commanded for step in session.state.steps])
+            assert np.array([step.commanded for step in again.state.steps]) == pytest.approx(before, abs=1e-12)
+            assert again.state.next_step is None

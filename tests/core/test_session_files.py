@@ -215,10 +215,12 @@ def test_a_disk_that_is_full_from_the_start_leaves_nothing_half_made(path: Path,
 
 def test_a_newer_file_is_refused_in_one_sentence(path: Path) -> None:
     connection = sqlite3.connect(path)
-    connection.execute("PRAGMA user_version = 2")
+    now = session_entries.SESSION_FORMAT
+    connection.execute(f"PRAGMA user_version = {now + 1}")
     connection.close()
+    sentence = rf"newer trueaxis \(session format {now + 1}; this one reads up to {now}\)"
     for read_only in (True, False):
-        with pytest.raises(SessionError, match=r"newer trueaxis \(session format 2; this one reads up to 1\)") as told:
+        with pytest.raises(SessionError, match=sentence) as told:
             Session.open(path, read_only=read_only)
         assert "\n" not in str(told.value)
     assert "newer trueaxis" in list_sessions(path.parent)[0].problem
@@ -234,9 +236,10 @@ def test_an_older_file_is_read_and_continued(path: Path, monkeypatch: pytest.Mon
 
     with Session.open(path, read_only=True) as before:
         shots = before.state.shots
+    now = session_entries.SESSION_FORMAT
     for module in (session_entries, session_reader, session_store):
-        monkeypatch.setattr(module, "SESSION_FORMAT", 2)
-    monkeypatch.setitem(session_entries.MIGRATIONS, 1, renamed)
+        monkeypatch.setattr(module, "SESSION_FORMAT", now + 1)
+    monkeypatch.setitem(session_entries.MIGRATIONS, now, renamed)
     with Session.open(path) as session:
         assert session.state.title.endswith(", renamed")
         assert session.state.shots == shots
@@ -245,7 +248,7 @@ def test_an_older_file_is_read_and_continued(path: Path, monkeypatch: pytest.Mon
         assert again.state.title == "new"
         assert again.undo().title.endswith(", renamed")
     monkeypatch.undo()
-    with pytest.raises(SessionError, match="session format 2"):
+    with pytest.raises(SessionError, match=f"session format {now + 1}"):
         Session.open(path)
 
 

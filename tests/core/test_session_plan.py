@@ -85,3 +85,21 @@ def test_the_same_sweep_twice_and_a_short_home_are_refused() -> None:
         check_plan(irb_l6.cell().robot, LINKS, Plan((row, row)))
     with pytest.raises(InputError, match="home has 2 values, expected 6"):
         check_plan(irb_l6.cell().robot, LINKS, Plan((row,), (0.0, 0.0)))
+
+
+def test_a_sweep_may_be_held_elsewhere_than_at_home() -> None:
+    cell = irb_l6.cell()
+    held = tuple((np.array(cell.home) + np.deg2rad([0, 10, -20, 0, 30, 0])).tolist())
+    steps = steps_of(cell.robot, sweep(held=held))
+    moved = active_commands(cell.robot, np.array([s.commanded for s in steps])) - active_commands(cell.robot, held)
+    assert np.abs(np.delete(moved, 5, axis=1)).max() < 1e-12
+    assert moved[:, 5] == pytest.approx(np.linspace(-0.4, 0.4, 5))
+    with pytest.raises(InputError, match="held at 2 values, expected 6"):
+        check_plan(cell.robot, LINKS, sweep(held=(0.0, 0.0)))
+
+
+def test_a_pass_never_starts_beyond_a_limit() -> None:
+    robot = irb_l6.cell().robot
+    high = robot.joints[5].limits[1] - irb_l6.cell().home[5]
+    steps = steps_of(robot, sweep(high=high, both_ways=True))
+    assert max(step.start[5] for step in steps if step.start is not None) <= robot.joints[5].limits[1]
