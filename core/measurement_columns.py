@@ -20,7 +20,7 @@ PLAIN = ("record", "phase", "joint", "sweep", "step", "pose", "use", "approach",
 QUATERNION = ("target_qw", "target_qx", "target_qy", "target_qz")
 POINT, SIMULATED = ("x", "y", "z"), ("sim_x", "sim_y", "sim_z")
 COVARIANCE = ("cov_xx", "cov_xy", "cov_xz", "cov_yy", "cov_yz", "cov_zz")
-_NUMBERED = re.compile(r"(q|speed|tau|read|approach)(\d{1,6})(?:_(.*))?", re.ASCII)
+_NUMBERED = re.compile(r"(q|speed|tau|read|want|approach)(\d{1,6})(?:_(.*))?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def _campaign_units(robot: Robot) -> dict[str, tuple[str, ...]]:
     for number, joint in enumerate(robot.joints, 1):
         if robot.commanded[number - 1]:
             units[f"q{number}"] = displacement_units(joint.slides)
-        units[f"read{number}"] = displacement_units(joint.slides)
+        units[f"read{number}"] = units[f"want{number}"] = displacement_units(joint.slides)
         units[f"speed{number}"] = speed_units(joint.slides)
         units[f"tau{number}"] = ("n",) if joint.slides else ("nm",)
     return units

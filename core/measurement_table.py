@@ -178,6 +178,7 @@ def _conditions(columns: Columns, robot: Robot) -> dict[str, Array | None]:
         "speed": _per_joint(columns, robot, "speed", 0.0),
         "torque_nm": _per_joint(columns, robot, "tau", np.nan),
         "readback": _per_joint(columns, robot, "read", np.nan),
+        "wanted": _per_joint(columns, robot, "want", np.nan),
         "target_quaternion": _quaternion(columns.table),
         "simulated_point_m": columns.together(SIMULATED),
     }

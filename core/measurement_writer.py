@@ -86,6 +86,7 @@ def _conditions(table: Measurements, robot: Robot) -> dict[str, Sequence[str]]:
         columns |= _one_of(table.speed, f"speed{i + 1}", speed_units(joint.slides)[0], i)
         columns |= _one_of(table.torque_nm, f"tau{i + 1}", "n" if joint.slides else "nm", i)
         columns |= _one_of(table.readback, f"read{i + 1}", displacement_units(joint.slides)[0], i)
+        columns |= _one_of(table.wanted, f"want{i + 1}", displacement_units(joint.slides)[0], i)
     if table.target_quaternion is not None:
         columns |= {name: _numbers(q) for name, q in zip(QUATERNION, table.target_quaternion.T, strict=True)}
     if table.simulated_point_m is not None:

@@ -78,6 +78,8 @@ class Measurements:
     """Joint torques (N for sliding joints), (m, n)."""
     readback: Array | None = None
     """Joint values read back, rad or m, (m, n)."""
+    wanted: Array | None = None
+    """Commands by which the nominal arm would take a compensated pose, rad or m, (m, n); NaN: as commanded."""
     target_quaternion: Array | None = None
     """Orientation of a 6-D target in the instrument's frame, w x y z, (m, 4)."""
     simulated_point_m: Array | None = None

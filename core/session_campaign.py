@@ -116,6 +116,7 @@ def _measurements(shots: list[Shot], targets: tuple[Target, ...], robot: Robot, 
         speed=_table(taken, "speed", n, 0.0),
         torque_nm=_table(taken, "torque_nm", n),
         readback=_table(taken, "readback", n),
+        wanted=_table(taken, "wanted", n),
         target_quaternion=_table(taken, "target_quaternion", 4),
         simulated_point_m=_table(taken, "simulated_point_m", 3),
     )

@@ -15,6 +15,7 @@ from core.session_events import (
     NoteWritten,
     OfStep,
     Planned,
+    PosesPlanned,
     RobotChosen,
     SessionError,
     ShotTaken,
@@ -23,6 +24,7 @@ from core.session_events import (
     WentTo,
 )
 from core.session_plan import Plan, check_plan
+from core.session_poses import PosePlan, check_pose_plan
 from core.session_robot import robot_of_texts
 from core.session_state import State
 
@@ -87,6 +89,10 @@ def _plan(state: State, event: Planned) -> None:
     check_plan(_needed_robot(state), state.target_links, Plan(event.sweeps, event.home, event.joint_values))
 
 
+def _poses(state: State, event: PosesPlanned) -> None:
+    check_pose_plan(_needed_robot(state), state.target_links, PosePlan(event.wanted, event.targets))
+
+
 def _shot(state: State, event: ShotTaken) -> None:
     _check_numbers("the shot", _needed_robot(state), event)
     _check_target("the shot", state.target_links, event)
@@ -101,7 +107,7 @@ def _shot(state: State, event: ShotTaken) -> None:
 
 def _check_numbers(name: str, robot: Robot, shot: ShotTaken) -> None:
     n = robot.joint_count
-    for word in ("commanded", "approach", "speed", "torque_nm", "readback"):
+    for word in ("commanded", "approach", "speed", "torque_nm", "readback", "wanted"):
         values = getattr(shot, word)
         if (values and len(values) != n) or (word == "commanded" and not values):
             raise SessionError(f"{name}: {word} has {len(values)} values, expected {n}, one a joint of {robot.name}")
@@ -175,6 +181,7 @@ _CHECKS: dict[type[Event], Callable[[State, Any], None]] = {
     RobotChosen: _robot,
     TargetsNamed: _targets,
     Planned: _plan,
+    PosesPlanned: _poses,
     ShotTaken: _shot,
     Judged: _judged,
     Skipped: _step,

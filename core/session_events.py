@@ -13,6 +13,7 @@ from msgspec import Meta
 from core.errors import InputError
 from core.input_files import shown
 from core.session_plan import PlannedSweep, StepKey
+from core.session_poses import MOST_POSES
 from core.session_values import Line, Number, Numbers, Point, PositiveInt, SomeNumbers, Text, UpperTriangle
 
 LONGEST_EVENT_BYTES = 8_000_000
@@ -112,6 +113,13 @@ class Planned(Event, frozen=True, tag="plan"):
     joint_values: Literal["commanded", "goal", "readback"] = "commanded"
 
 
+class PosesPlanned(Event, frozen=True, tag="poses"):
+    """The poses at which the arm is to be verified; see ``core.session_poses``."""
+
+    wanted: Annotated[tuple[Numbers, ...], Meta(max_length=MOST_POSES)]
+    targets: Annotated[tuple[Line, ...], Meta(max_length=100)]
+
+
 class Fact(Event, frozen=True, tag="fact"):
     """Something worth keeping with the data: a serial number, a place, the payload; an empty value takes it away."""
 
@@ -159,6 +167,8 @@ class ShotTaken(Event, frozen=True, tag="shot"):
     speed: Numbers | None = None
     torque_nm: SomeNumbers | None = None
     readback: SomeNumbers | None = None
+    wanted: SomeNumbers | None = None
+    """Of a compensated pose: commands by which the nominal arm would take it, (n,)."""
     target_quaternion: tuple[Number, Number, Number, Number] | None = None
     simulated_point_m: Point | None = None
 
@@ -253,8 +263,8 @@ class Redo(Event, frozen=True, tag="redo"):
 
 AnyEvent = (
     Created | Opened | Closed | Copied | Titled | OperatorNamed | RobotChosen | TargetsNamed | InstrumentChosen
-    | Planned | Fact | Setting | ShotTaken | Judged | Skipped | WentTo | CheckShot | Solved | NoteWritten | Failed
-    | Undo | Redo
+    | Planned | PosesPlanned | Fact | Setting | ShotTaken | Judged | Skipped | WentTo | CheckShot | Solved | NoteWritten
+    | Failed | Undo | Redo
 )  # fmt: skip
 _WORDS = (
     (re.compile("str matching regex .*", re.DOTALL), "a text without control characters, on one line if it is a name"),

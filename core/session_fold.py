@@ -25,6 +25,7 @@ from core.session_events import (
     Opened,
     OperatorNamed,
     Planned,
+    PosesPlanned,
     RobotChosen,
     Setting,
     ShotTaken,
@@ -35,6 +36,7 @@ from core.session_events import (
     WentTo,
 )
 from core.session_plan import Plan
+from core.session_poses import PosePlan
 from core.session_state import Check, Failure, Note, Shot, Solve, State
 
 FILING = (Opened, Closed, Copied)
@@ -87,6 +89,10 @@ def _instrument(state: State, entry: Entry, event: InstrumentChosen) -> dict[str
 
 def _plan(state: State, entry: Entry, event: Planned) -> dict[str, Any]:
     return {"plan": Plan(event.sweeps, event.home, event.joint_values)}
+
+
+def _poses(state: State, entry: Entry, event: PosesPlanned) -> dict[str, Any]:
+    return {"poses": PosePlan(event.wanted, event.targets)}
 
 
 def _fact(state: State, entry: Entry, event: Fact) -> dict[str, Any]:
@@ -161,6 +167,7 @@ _CHANGES: dict[type[Event], Callable[[State, Entry, Any], dict[str, Any]]] = {
     TargetsNamed: _targets,
     InstrumentChosen: _instrument,
     Planned: _plan,
+    PosesPlanned: _poses,
     Fact: _fact,
     Setting: _setting,
     ShotTaken: _shot,

@@ -40,6 +40,7 @@ OPTIONAL = (
     "speed",
     "torque_nm",
     "readback",
+    "wanted",
     "target_quaternion",
     "simulated_point_m",
 )

@@ -1,6 +1,11 @@
-"""A planned step and what the instrument saw there -> the shot that a session keeps."""
+"""What was asked for and what the instrument saw there -> the shot that a session keeps."""
+
+from typing import Any
+
+import numpy as np
 
 from core.instruments import Reading
+from core.measurements import POSE
 from core.session_events import ShotTaken
 from core.session_plan import Step
 
@@ -16,16 +21,51 @@ def shot_at(step: Step, reading: Reading, payload_kg: float | None = None, repla
     return ShotTaken(
         target=step.target,
         commanded=step.commanded,
-        point_m=reading.point_m,
-        covariance_m2=reading.covariance_m2,
         joint=step.joint,
         sweep=step.sweep,
         step=step.step,
         approach=tuple(approach),
         replaces=replaces,
-        angles_rad=reading.angles_rad,
-        time_s=reading.time_s,
-        temperature_c=reading.temperature_c,
-        arm_temperature_c=reading.arm_temperature_c,
         payload_kg=payload_kg,
+        **_seen(reading),
     )
+
+
+def shot_of_pose(
+    number: int,
+    target: str,
+    commanded: tuple[float, ...],
+    wanted: tuple[float, ...],
+    before: tuple[float, ...],
+    reading: Reading,
+) -> ShotTaken:
+    """A shot at a test pose, which no calibration ever fits.
+
+    Args:
+        number: of the standstill, the index of the pose in a campaign.
+        commanded: what the robot was sent, (n,).
+        wanted: what the nominal arm would have been sent, (n,).
+        before: the commands that the robot came from, (n,).
+    """
+    return ShotTaken(
+        target=target,
+        commanded=commanded,
+        phase=POSE,
+        pose=number,
+        approach=tuple(np.sign(np.subtract(commanded, before)).astype(int).tolist()),
+        check=True,
+        wanted=None if commanded == wanted else wanted,
+        **_seen(reading),
+    )
+
+
+def _seen(reading: Reading) -> dict[str, Any]:
+    """The fields of a shot that come from the instrument."""
+    return {
+        "point_m": reading.point_m,
+        "covariance_m2": reading.covariance_m2,
+        "angles_rad": reading.angles_rad,
+        "time_s": reading.time_s,
+        "temperature_c": reading.temperature_c,
+        "arm_temperature_c": reading.arm_temperature_c,
+    }

@@ -16,6 +16,7 @@ from core.measurements import SWEEP, Instrument, Target
 from core.robot import Robot
 from core.session_events import CheckShot, NoteWritten, ShotTaken, Solved, Verdict
 from core.session_plan import Plan, Step, StepKey, check_plan, steps_of
+from core.session_poses import PosePlan
 from core.session_robot import robot_of_texts
 
 NOTHING: Mapping = MappingProxyType({})
@@ -116,6 +117,8 @@ class State:
     targets: tuple[Target, ...] = ()
     instrument: Instrument = field(default_factory=Instrument)
     plan: Plan = field(default_factory=Plan)
+    poses: PosePlan = field(default_factory=PosePlan)
+    """At which the arm is verified."""
     shots: tuple[Shot, ...] = ()
     """By growing id; excluded and superseded ones too."""
     next_record: int = 1

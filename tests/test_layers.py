@@ -29,6 +29,7 @@ CALIBRATION = """
 """
 SESSIONS = """
     core.instruments core.session_robot core.session_values core.session_journal core.session_plan
+    core.session_poses
     core.session_events core.suggested_plan
     core.session_entries core.session_import core.session_shots core.session_state
     core.session_lock core.session_store core.session_checks core.session_fold core.session_reader
@@ -42,7 +43,8 @@ RESULTS = """
 USE = """
     core.driven_robot core.pose_iteration core.pose_seeds core.inverse_kinematics
     core.calibrated_arm core.calibration_file core.pose_files core.compensation
-    core.rigid_pose core.standstills core.end_effector core.verification core.repeatability core.verification_json
+    core.rigid_pose core.standstills core.pose_visits core.end_effector
+    core.verification core.repeatability core.verification_json
     core.robot_export core.dh_export
 """
 APP = """

@@ -1,16 +1,18 @@
-"""A simulated cell as the beginning of a session: what an operator would enter, and table 1 as the plan."""
+"""A simulated cell as the beginning of a session: what an operator would enter, table 1 and test poses as the plan."""
 
+from core.kinematics import active_commands
 from core.session_events import (
     Event,
     Fact,
     InstrumentChosen,
     Planned,
+    PosesPlanned,
     RobotChosen,
     TargetEntry,
     TargetsNamed,
     Titled,
 )
-from core.session_plan import Plan, PlannedSweep
+from core.session_plan import Plan, PlannedSweep, commands_for
 from core.twin.cell import Cell
 
 
@@ -33,6 +35,12 @@ def plan_for(cell: Cell) -> Plan:
     return Plan(tuple(sweeps), None if cell.home is None else tuple(float(value) for value in cell.home))
 
 
+def poses_for(cell: Cell) -> tuple[tuple[float, ...], ...]:
+    """The test poses of a cell's protocol, as commands."""
+    motors = active_commands(cell.robot, cell.centre) + cell.protocol.poses
+    return tuple(tuple(row) for row in commands_for(cell.robot, motors).tolist())
+
+
 def demo_events(cell: Cell) -> list[Event]:
     """What a session on a simulated cell begins with."""
     plan, instrument = plan_for(cell), cell.instrument.statement
@@ -42,5 +50,6 @@ def demo_events(cell: Cell) -> list[Event]:
         TargetsNamed(tuple(TargetEntry(t.name, t.link, t.point_m, t.sigma_m) for t in cell.targets)),
         InstrumentChosen(instrument.kind, instrument.sigma_m, instrument.description),
         Planned(plan.sweeps, plan.home),
+        *([PosesPlanned(poses_for(cell), cell.protocol.pose_targets)] if len(cell.protocol.poses) else []),
         *(Fact(key, value) for key, value in cell.notes),
     ]
