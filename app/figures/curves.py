@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
-from app.figures.style import BLACK, NOISE_BAND, SERIES, SYMBOLS, band, styled, symmetric_range, thinned
+from app.figures.sheet import Panel, stacked
+from app.figures.style import NOISE_BAND, SERIES, SYMBOLS, Trace, band, symmetric_range, thinned
 from core.function_fit import FunctionFit
 from core.geometry import Array
 
@@ -61,51 +61,43 @@ def fitted_curve(fit: FunctionFit, low: float, high: float, slope: float, home: 
 
 def curve_figure(title: str, observed: tuple[Observed, ...], fitted: Fitted, x_title: str, unit: str) -> go.Figure:
     """Errors before the fit with the fitted curve, and what is left after it, one above the other."""
-    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.07, row_heights=[0.56, 0.44])
-    if fitted.std.max() > 0:
-        low, high = fitted.deviation - COVERAGE * fitted.std, fitted.deviation + COVERAGE * fitted.std
-        figure.add_trace(band(fitted.x, low, high, "95 % band"), row=1, col=1)
-    figure.add_trace(_line(fitted), row=1, col=1)
     spread = float(np.sqrt(np.mean(np.concatenate([o.std for o in observed]) ** 2)))
     noise = band(fitted.x[[0, -1]], np.full(2, -2 * spread), np.full(2, 2 * spread), "±2σ of a stop", NOISE_BAND)
-    figure.add_trace(noise, row=2, col=1)
-    for index, one in enumerate(observed):
-        _add_observed(figure, one, index, len(observed) > 1, unit)
-    styled(figure, title, 205)
     limits = symmetric_range(*(o.after for o in observed), np.atleast_1d(2 * spread))
-    figure.update_yaxes(title_text=f"error [{unit}]", nticks=6, row=1, col=1)
-    figure.update_yaxes(title_text=f"left over [{unit}]", range=limits, nticks=5, row=2, col=1)
-    figure.update_xaxes(title_text=x_title, title_standoff=6, row=2, col=1)
-    return figure
-
-
-def _line(fitted: Fitted) -> go.Scatter:
-    return go.Scatter(
-        x=fitted.x,
-        y=fitted.deviation,
-        mode="lines",
-        line={"color": BLACK, "width": 1.6},
-        name="fit",
-        hoverinfo="skip",
+    several = len(observed) > 1
+    before, after = zip(*(_both(one, k, several, unit) for k, one in enumerate(observed)), strict=True)
+    panels = (
+        Panel((*_fit(fitted), *before), {"title_text": f"error [{unit}]", "nticks": 6}, height=0.56),
+        Panel((noise, *after), {"title_text": f"left over [{unit}]", "range": limits, "nticks": 5}, height=0.44),
     )
+    return stacked(title, panels, x_title, 205, gap=0.07)
 
 
-def _add_observed(figure: go.Figure, one: Observed, index: int, several: bool, unit: str) -> None:
+def _fit(fitted: Fitted) -> tuple[Trace, ...]:
+    """The fitted curve, after its band where it has one."""
+    line = {"type": "scatter", "x": fitted.x, "y": fitted.deviation, "mode": "lines", "line": {"width": 1.6}}
+    line |= {"name": "fit", "hoverinfo": "skip"}
+    if fitted.std.max() <= 0:
+        return (line,)
+    low, high = fitted.deviation - COVERAGE * fitted.std, fitted.deviation + COVERAGE * fitted.std
+    return band(fitted.x, low, high, "95 % band"), line
+
+
+def _both(one: Observed, index: int, several: bool, unit: str) -> tuple[Trace, Trace]:
+    """What one sweep shows before and after the fit."""
     drawn = thinned(len(one.x), one.after)
-    marker = {
-        "color": SERIES[index % len(SERIES)],
-        "symbol": SYMBOLS[index % len(SYMBOLS)],
-        "size": 5 if len(drawn) < 300 else 3,
+    common = {
+        "type": "scatter",
+        "x": one.x[drawn],
+        "mode": "markers",
+        "marker": {
+            "color": SERIES[index % len(SERIES)],
+            "symbol": SYMBOLS[index % len(SYMBOLS)],
+            "size": 5 if len(drawn) < 300 else 3,
+        },
+        "name": one.name,
+        "legendgroup": one.name,
+        "hovertemplate": f"%{{x:.3f}}: %{{y:.4f}} {unit}<extra>{one.name}</extra>",
     }
-    for row, values in ((1, one.before), (2, one.after)):
-        trace = go.Scatter(
-            x=one.x[drawn],
-            y=values[drawn],
-            mode="markers",
-            marker=marker,
-            name=one.name,
-            legendgroup=one.name,
-            showlegend=several and row == 1,
-            hovertemplate=f"%{{x:.3f}}: %{{y:.4f}} {unit}<extra>{one.name}</extra>",
-        )
-        figure.add_trace(trace, row=row, col=1)
+    before = {**common, "y": one.before[drawn], "showlegend": several}
+    return before, {**common, "y": one.after[drawn], "showlegend": False}

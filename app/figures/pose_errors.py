@@ -3,7 +3,8 @@
 import numpy as np
 import plotly.graph_objects as go
 
-from app.figures.style import BLUE, GREY, VERMILLION, WIDE_PX, styled, thinned
+from app.figures.sheet import Panel, stacked
+from app.figures.style import BLUE, GREY, VERMILLION, WIDE_PX, Trace, thinned
 from core.geometry import Array
 from core.verification import Errors, Verification
 
@@ -29,21 +30,20 @@ def _errors_figure(
 ) -> go.Figure:
     """Both models on one logarithmic scale: what calibration takes away is a distance in it."""
     poses = np.array([str(p) for p in found.measured.seen.pose])
-    figure = go.Figure()
+    traces: list[Trace] = []
     for errors, name, colour, symbol in zip(
         pair, ("nominal", "calibrated"), (VERMILLION, BLUE), ("square", "circle"), strict=True
     ):
-        figure.add_trace(_series(poses, errors, name, colour, symbol, unit, scale))
-        figure.add_trace(_level(poses, errors.mean * scale, f"{name}, mean", colour, "dot"))
+        traces.append(_series(poses, errors, name, colour, symbol, unit, scale))
+        traces.append(_level(poses, errors.mean * scale, f"{name}, mean", colour, "dot"))
     if limit is not None:
-        figure.add_trace(_level(poses, limit * scale, f"limit, {limit * scale:g} {unit}", GREY, "dash"))
-    styled(figure, title, HEIGHT_PX, WIDE_PX)
+        traces.append(_level(poses, limit * scale, f"limit, {limit * scale:g} {unit}", GREY, "dash"))
     values = np.concatenate([errors.value for errors in pair]) * scale
-    figure.update_yaxes(
-        type="log", range=_decades(values, limit, scale), title_text=f"error [{unit}]", zeroline=False, dtick=1
-    )
-    figure.update_xaxes(title_text="pose", type="category", title_standoff=4, nticks=min(len(poses), 30))
-    figure.update_layout(margin={"b": 76})
+    y = {"type": "log", "range": _decades(values, limit, scale), "title_text": f"error [{unit}]", "zeroline": False}
+    x = {"type": "category", "title_standoff": 4, "nticks": min(len(poses), 30)}
+    panel = Panel(tuple(traces), y | {"dtick": 1}, x)
+    figure = stacked(title, (panel,), "pose", HEIGHT_PX, width_px=WIDE_PX)
+    figure.layout.margin.b = 76
     return figure
 
 
@@ -52,29 +52,31 @@ def _series(poses: Array, errors: Errors, name: str, colour: str, symbol: str, u
     value, band = errors.value[drawn] * scale, 2 * errors.std[drawn] * scale
     # A bar that would end below zero has no place on a logarithmic scale; it ends at the bottom of the figure.
     down = np.minimum(band, value * (1 - 1e-6))
-    return go.Scatter(
-        x=poses[drawn],
-        y=np.maximum(value, 1e-12),
-        error_y={"array": band, "arrayminus": down, "symmetric": False, "thickness": 1.2, "width": 3},
-        mode="markers",
-        marker={"color": colour, "symbol": symbol, "size": 8 if len(drawn) < 60 else 4},
-        name=name,
-        legendgroup=name,
-        customdata=band,
-        hovertemplate=f"pose %{{x}}: %{{y:.3g}} ± %{{customdata:.2g}} {unit}<extra>{name}</extra>",
-    )
+    return {
+        "type": "scatter",
+        "x": poses[drawn],
+        "y": np.maximum(value, 1e-12),
+        "error_y": {"array": band, "arrayminus": down, "symmetric": False, "thickness": 1.2, "width": 3},
+        "mode": "markers",
+        "marker": {"color": colour, "symbol": symbol, "size": 8 if len(drawn) < 60 else 4},
+        "name": name,
+        "legendgroup": name,
+        "customdata": band,
+        "hovertemplate": f"pose %{{x}}: %{{y:.3g}} ± %{{customdata:.2g}} {unit}<extra>{name}</extra>",
+    }
 
 
-def _level(poses: Array, height: float, name: str, colour: str, dash: str) -> go.Scatter:
+def _level(poses: Array, height: float, name: str, colour: str, dash: str) -> Trace:
     """A line over all poses; plotly would put the label of a horizontal line elsewhere on a logarithmic scale."""
-    return go.Scatter(
-        x=[poses[0], poses[-1]],
-        y=[max(height, 1e-12)] * 2,
-        mode="lines",
-        line={"color": colour, "width": 1.5, "dash": dash},
-        name=name,
-        hovertemplate=f"%{{y:.3g}}<extra>{name}</extra>",
-    )
+    return {
+        "type": "scatter",
+        "x": [poses[0], poses[-1]],
+        "y": [max(height, 1e-12)] * 2,
+        "mode": "lines",
+        "line": {"color": colour, "width": 1.5, "dash": dash},
+        "name": name,
+        "hovertemplate": f"%{{y:.3g}}<extra>{name}</extra>",
+    }
 
 
 def _decades(values: Array, limit: float | None, scale: float) -> list[float]:

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
-from app.figures.style import NOISE_BAND, SERIES, SYMBOLS, VERMILLION, band, plain, styled, symmetric_range, thinned
+from app.figures.sheet import Panel, stacked
+from app.figures.style import NOISE_BAND, SERIES, SYMBOLS, VERMILLION, Trace, band, plain, symmetric_range, thinned
 from core.calibration import Calibration
 from core.geometry import Array
 from core.report import sweep_rows
@@ -28,21 +28,18 @@ def residual_figure(calibration: Calibration, index: int) -> go.Figure:
     """The residuals of sweep ``index`` (0.., in the order of measurement) over the commanded displacement."""
     found, rows = list(sweep_rows(calibration))[index]
     directions = _directions(calibration, found, rows)
-    limits = symmetric_range(*_sizes(calibration))
-    figure = make_subplots(rows=len(directions), cols=1, shared_xaxes=True, vertical_spacing=0.045)
-    joint = calibration.campaign.robot.joints[found.sweep.joint - 1]
-    unit, scale = display_unit(joint.slides)
+    limits = symmetric_range(*sizes_mm(calibration))
+    unit, scale = display_unit(calibration.campaign.robot.joints[found.sweep.joint - 1].slides)
     x = found.sweep.commanded[found.sweep.stop, found.sweep.joint - 1] * scale
     used = calibration.refinement.residuals.used[rows]
-    for row, direction in enumerate(directions, 1):
-        ends, width = np.array([x.min(), x.max()]), np.full(2, 2 * direction.sigma)
-        figure.add_trace(band(ends, -width, width, "±2σ expected", NOISE_BAND, row == 1), row=row, col=1)
-        _add_points(figure, calibration, found, x, direction.value, used, limits[1], row)
-    styled(figure, f"Joint {found.sweep.joint}, sweep {found.sweep.number}", 104 * len(directions))
-    for row, direction in enumerate(directions, 1):
-        figure.update_yaxes(title_text=direction.title, range=limits, nticks=5, row=row, col=1)
-    figure.update_xaxes(title_text=f"commanded [{unit}]", title_standoff=6, row=len(directions), col=1)
-    return figure
+    ends, panels = np.array([x.min(), x.max()]), []
+    for row, direction in enumerate(directions):
+        width = np.full(2, 2 * direction.sigma)
+        noise = band(ends, -width, width, "±2σ expected", NOISE_BAND, row == 0)
+        points = _points(calibration, found, x, direction.value, used, limits[1], row == 0)
+        panels.append(Panel((noise, *points), {"title_text": direction.title, "range": limits, "nticks": 5}))
+    title = f"Joint {found.sweep.joint}, sweep {found.sweep.number}"
+    return stacked(title, tuple(panels), f"commanded [{unit}]", 104 * len(directions), gap=0.045)
 
 
 def thinned_sweeps(calibration: Calibration) -> tuple[str, ...]:
@@ -82,7 +79,7 @@ def _sigma_mm(covariance: Array, direction: Array) -> float:
     return float(np.sqrt(np.mean(np.einsum("mi,mij,mj->m", direction, covariance, direction)))) * 1e3
 
 
-def _sizes(calibration: Calibration) -> tuple[Array, ...]:
+def sizes_mm(calibration: Calibration) -> tuple[Array, ...]:
     """Everything that the common range of all sweeps must hold: used points, and the expected scatter, mm."""
     residuals = calibration.refinement.residuals
     used = residuals.used
@@ -90,51 +87,47 @@ def _sizes(calibration: Calibration) -> tuple[Array, ...]:
     return (*shown, np.array([2 * calibration.estimate.noise_m * 1e3]))
 
 
-def _add_points(
-    figure: go.Figure,
-    calibration: Calibration,
-    found: SweepFit,
-    x: Array,
-    value: Array,
-    used: np.ndarray,
-    top: float,
-    row: int,
-) -> None:
+def _points(
+    calibration: Calibration, found: SweepFit, x: Array, value: Array, used: np.ndarray, top: float, first: bool
+) -> list[Trace]:
+    """The points of each target, and those that were rejected."""
+    traces = []
     for order, target in enumerate(dict.fromkeys(found.sweep.target.tolist())):
         mine = np.flatnonzero((found.sweep.target == target) & used)
         mine = mine[thinned(len(mine), value[mine])]
         name = plain(calibration.campaign.targets[target].name)
-        colour, symbol = SERIES[order % len(SERIES)], SYMBOLS[order % len(SYMBOLS)]
-        figure.add_trace(
-            go.Scatter(
-                x=x[mine],
-                y=value[mine],
-                mode="markers",
-                marker={"color": colour, "symbol": symbol, "size": 5 if len(mine) < 300 else 3},
-                name=name,
-                legendgroup=f"target {order}",
-                showlegend=row == 1,
-                hovertemplate=f"%{{x:.2f}}: %{{y:.3f}} mm<extra>{name}</extra>",
-            ),
-            row=row,
-            col=1,
-        )
+        trace = {
+            "type": "scatter",
+            "x": x[mine],
+            "y": value[mine],
+            "mode": "markers",
+            "marker": {
+                "color": SERIES[order % len(SERIES)],
+                "symbol": SYMBOLS[order % len(SYMBOLS)],
+                "size": 5 if len(mine) < 300 else 3,
+            },
+            "name": name,
+            "legendgroup": f"target {order}",
+            "showlegend": first,
+            "hovertemplate": f"%{{x:.2f}}: %{{y:.3f}} mm<extra>{name}</extra>",
+        }
+        traces.append(trace)
     out = np.flatnonzero(~used)
-    if len(out):
-        figure.add_trace(_rejected(x[out], value[out], top, row), row=row, col=1)
+    return [*traces, rejected_trace(x[out], value[out], top, first)] if len(out) else traces
 
 
-def _rejected(x: Array, value: Array, top: float, row: int) -> go.Scatter:
+def rejected_trace(x: Array, value: Array, top: float, first: bool) -> Trace:
     """Rejected points as crosses; those beyond the range stand at its edge."""
     drawn = thinned(len(x), value)
-    return go.Scatter(
-        x=x[drawn],
-        y=np.clip(value[drawn], -0.93 * top, 0.93 * top),
-        customdata=value[drawn],
-        mode="markers",
-        marker={"color": VERMILLION, "symbol": "x-open", "size": 8, "line": {"width": 1.5}},
-        name="rejected",
-        legendgroup="rejected",
-        showlegend=row == 1,
-        hovertemplate="%{x:.2f}: %{customdata:.3f} mm<extra>rejected</extra>",
-    )
+    return {
+        "type": "scatter",
+        "x": x[drawn],
+        "y": np.clip(value[drawn], -0.93 * top, 0.93 * top),
+        "customdata": value[drawn],
+        "mode": "markers",
+        "marker": {"color": VERMILLION, "symbol": "x-open", "size": 8, "line": {"width": 1.5}},
+        "name": "rejected",
+        "legendgroup": "rejected",
+        "showlegend": first,
+        "hovertemplate": "%{x:.2f}: %{customdata:.3f} mm<extra>rejected</extra>",
+    }

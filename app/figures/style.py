@@ -4,12 +4,16 @@ Colours are those of Okabe and Ito (2008, "Color Universal Design"): told apart 
 markers that always go with them, in grey print.
 """
 
+from collections.abc import Mapping, Sequence
 from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
 
 from core.geometry import Array
+
+Trace = dict[str, object]
+"""A trace as plotly writes it; whole figures are made of them at once, because traces added one by one take long."""
 
 WIDTH_PX = 340
 """Of one small figure; two stand side by side on A4 paper."""
@@ -38,22 +42,43 @@ CONFIG = {
 """For ``Plotly.newPlot``."""
 
 
-DARK_PAPER, DARK_INK, DARK_GRID = "#1f1f1f", "#d6d6d6", "#3c3f44"
+DARK_INK = "#d6d6d6"
+CLEAR = "rgba(0, 0, 0, 0)"
+
+
+def _look(ink: str, frame: str, grid: str) -> go.layout.Template:
+    """What all figures on one kind of ground share; plotly in the browser fills it in."""
+    axis = {"showline": True, "linecolor": frame, "gridcolor": grid, "ticks": "outside", "ticklen": 4, "mirror": True}
+    axis |= {"tickcolor": frame, "title_font_size": 11, "tickfont_size": 10.5, "automargin": False}
+    layout = {
+        "font": {"family": FONT, "size": 11, "color": ink},
+        "title": {"x": 0.0, "xref": "container", "xanchor": "left", "y": 1.0, "yref": "container", "yanchor": "top"},
+        "title_pad": {"t": 7, "l": 4},
+        "title_font_size": 13,
+        # The page shows through, so that a figure needs to know neither its colour nor its frame.
+        "paper_bgcolor": CLEAR,
+        "plot_bgcolor": CLEAR,
+        "legend": {"orientation": "h", "x": 0.01, "xref": "container", "xanchor": "left"},
+        "legend_y": 0.0,
+        "legend_yref": "container",
+        "legend_yanchor": "bottom",
+        "legend_font_size": 10.5,
+        "legend_tracegroupgap": 0,
+        "hoverlabel_font_size": 11,
+        "xaxis": {**axis, "zeroline": False},
+        "yaxis": {**axis, "zeroline": True, "zerolinecolor": frame, "zerolinewidth": 1},
+    }
+    return go.layout.Template(layout=layout, data={"scatter": [{"line": {"color": ink}}]})
+
+
+LIGHT, DARK = _look(BLACK, "#9aa1ab", "#e4e7eb"), _look(DARK_INK, "#8b929c", "#3c3f44")
+"""Looks on a light and on a dark page. A line without a colour of its own is drawn in that of the text."""
 
 
 def in_theme(figure: go.Figure, dark: bool) -> go.Figure:
-    """A figure for a page with a dark theme, changed in place; a light one is left as it is."""
-    if dark:
-        figure.update_layout(paper_bgcolor=DARK_PAPER, plot_bgcolor=DARK_PAPER, font_color=DARK_INK)
-        figure.update_xaxes(gridcolor=DARK_GRID, linecolor=DARK_INK, zerolinecolor=DARK_INK)
-        figure.update_yaxes(gridcolor=DARK_GRID, linecolor=DARK_INK, zerolinecolor=DARK_INK)
-        figure.for_each_trace(lambda trace: trace.update(line_color=DARK_INK), _is_ink)
+    """A figure for a page with a light or a dark theme, changed in place."""
+    figure.layout.template = DARK if dark else LIGHT
     return figure
-
-
-def _is_ink(trace: go.Scatter) -> bool:
-    """Whether a trace is drawn in the colour of the text."""
-    return trace.mode is not None and "lines" in trace.mode and trace.line.color == BLACK
 
 
 def plain(text: str, longest: int = 24) -> str:
@@ -65,50 +90,42 @@ def plain(text: str, longest: int = 24) -> str:
 def styled(
     figure: go.Figure, title: str, panels_px: int, width_px: int = WIDTH_PX, legend_rows: int | None = None
 ) -> go.Figure:
-    """Give a figure the common look.
+    """Give a figure the common look and its size; it is changed in place, and returned. For arguments see ``frame``."""
+    figure.update_layout(frame(list(figure.data), title, panels_px, width_px, legend_rows))
+    return figure
+
+
+def frame(
+    traces: Sequence[Mapping | go.Scatter], title: str, panels_px: int, width_px: int, legend_rows: int | None = None
+) -> dict:
+    """Layout that every figure has: look, title, size and margins.
 
     Args:
-        figure: changed in place, and returned.
+        traces: of the figure, for the length of its legend.
         title: free of markup that is not meant.
         panels_px: height of the panels, without title, axis and legend.
         width_px: of the whole figure.
         legend_rows: lines of the legend; None: as many as its names need.
     """
-    rows = lines_of_legend(figure, width_px) if legend_rows is None else legend_rows
+    rows = lines_of_legend(traces, width_px) if legend_rows is None else legend_rows
     bottom = 46 + 18 * rows
-    figure.update_layout(
-        title={"text": f"<b>{title}</b>", "x": 0.0, "xref": "container", "xanchor": "left", "y": 1.0},
-        title_font_size=13,
-        title_yref="container",
-        title_yanchor="top",
-        title_pad={"t": 7, "l": 4},
-        width=width_px,
-        height=TOP_PX + panels_px + bottom,
-        margin={"l": 56, "r": 10, "t": TOP_PX, "b": bottom, "autoexpand": False},
-        font={"family": FONT, "size": 11, "color": BLACK},
-        paper_bgcolor="white",
-        plot_bgcolor="white",
-        legend={"orientation": "h", "x": 0.01, "xref": "container", "xanchor": "left", "y": 0.0, "yref": "container"},
-        legend_yanchor="bottom",
-        legend_font_size=10.5,
-        legend_tracegroupgap=0,
-        hoverlabel={"font_size": 11},
-        template="none",
-    )
-    axes = {"linecolor": "#9aa1ab", "showline": True, "gridcolor": "#e4e7eb", "ticks": "outside", "ticklen": 4}
-    axes |= {"tickcolor": "#9aa1ab", "title_font_size": 11, "tickfont_size": 10.5, "mirror": True, "automargin": False}
-    figure.update_xaxes(**axes, zeroline=False)
-    figure.update_yaxes(**axes, zeroline=True, zerolinecolor="#9aa1ab", zerolinewidth=1)
-    return figure
+    return {
+        "template": LIGHT,
+        "title": {"text": f"<b>{title}</b>"},
+        "width": width_px,
+        "height": TOP_PX + panels_px + bottom,
+        "margin": {"l": 56, "r": 10, "t": TOP_PX, "b": bottom, "autoexpand": False},
+    }
 
 
-def lines_of_legend(figure: go.Figure, width_px: int) -> int:
-    """How many lines the legend takes, by the widths of its names."""
+def lines_of_legend(traces: Sequence[Mapping | go.Scatter], width_px: int) -> int:
+    """How many lines the legend of traces takes, by the widths of their names."""
     lines, at = 1, 0.0
-    for trace in figure.data:
-        if trace.showlegend is False:
+    for trace in traces:
+        name, shown = (trace[key] if key in trace else None for key in ("name", "showlegend"))
+        if shown is False:
             continue
-        width = 48 + 6.3 * len(trace.name or "")
+        width = 48 + 6.3 * len(name or "")
         if at > 0 and at + width > width_px - 8:
             lines, at = lines + 1, 0.0
         at += width
@@ -139,17 +156,18 @@ def symmetric_range(*values: Array, share: float = 1.12) -> list[float]:
     return [-top, top]
 
 
-def band(x: Array, low: Array, high: Array, name: str, colour: str = BAND, show: bool = True) -> go.Scatter:
+def band(x: Array, low: Array, high: Array, name: str, colour: str = BAND, show: bool = True) -> Trace:
     """A filled band between two curves over ascending x."""
-    return go.Scatter(
-        x=np.concatenate([x, x[::-1]]),
-        y=np.concatenate([high, low[::-1]]),
-        fill="toself",
-        fillcolor=colour,
-        line={"width": 0},
-        mode="lines",
-        name=name,
-        legendgroup=name,
-        showlegend=show,
-        hoverinfo="skip",
-    )
+    return {
+        "type": "scatter",
+        "x": np.concatenate([x, x[::-1]]),
+        "y": np.concatenate([high, low[::-1]]),
+        "fill": "toself",
+        "fillcolor": colour,
+        "line": {"width": 0},
+        "mode": "lines",
+        "name": name,
+        "legendgroup": name,
+        "showlegend": show,
+        "hoverinfo": "skip",
+    }

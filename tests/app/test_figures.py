@@ -167,4 +167,4 @@ def test_names_from_files_are_text():
 def test_legends_have_room():
     for calibration in (six_joints(), families_compared()):
         figure = transmission_figure(calibration, 5)
-        assert figure.layout.margin.b >= 18 * lines_of_legend(figure, figure.layout.width) + 40
+        assert figure.layout.margin.b >= 18 * lines_of_legend(figure.data, figure.layout.width) + 40
