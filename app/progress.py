@@ -5,6 +5,8 @@ from types import TracebackType
 from typing import TextIO
 
 CLEAR = "\r\x1b[K"
+WIDTH = 20
+LONGEST_TEXT = 60
 
 
 class Progress:
@@ -22,9 +24,11 @@ class Progress:
     def step(self, text: str) -> None:
         """Say what is done next, in a few words."""
         self._step += 1
-        width = 20
-        done = width * (self._step - 1) // self._steps
-        self._write(f"{CLEAR}[{'#' * done}{'.' * (width - done)}] {self._step}/{self._steps} {text}")
+        self._write(_line((self._step - 1) / self._steps, f"{self._step}/{self._steps}", text))
+
+    def share(self, done: float, text: str) -> None:
+        """Say how much of the work is done, 0..1, and what is done next, which may come from a file."""
+        self._write(_line(done, f"{done:4.0%}", text))
 
     def __enter__(self) -> "Progress":
         return self
@@ -38,3 +42,9 @@ class Progress:
         if self._shown:
             self._stream.write(text)
             self._stream.flush()
+
+
+def _line(done: float, count: str, text: str) -> str:
+    filled = int(WIDTH * min(max(done, 0.0), 1.0))
+    shown = "".join(c if c.isprintable() else "?" for c in text[:LONGEST_TEXT])
+    return f"{CLEAR}[{'#' * filled}{'.' * (WIDTH - filled)}] {count} {shown}"

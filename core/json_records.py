@@ -23,6 +23,14 @@ class JsonRecord(FileRecord):
         """Whether there is such a key with something else than null."""
         return self._values.get(key) is not None
 
+    def names(self) -> tuple[str, ...]:
+        """All keys, in the order of the file."""
+        return tuple(self._values)
+
+    def get(self, key: str) -> object:
+        """Whatever stands under a key, unchecked; None: nothing."""
+        return self._values.get(key)
+
     def text(self, key: str) -> str:
         """A string on one line."""
         value = self._values.get(key)
@@ -89,6 +97,18 @@ def read_json(path: Path, form: str) -> JsonRecord:
     Raises:
         InputError: it is missing, too large, not JSON, or of another format.
     """
+    record = read_object(path, f" with format {form!r}")
+    if record.get("format") != form:
+        raise record.wrong("format", f'"{form}"')
+    return record
+
+
+def read_object(path: Path, described: str = "") -> JsonRecord:
+    """The object that a JSON file holds; ``described`` says in a message what is expected of it.
+
+    Raises:
+        InputError: it is missing, too large, or not JSON.
+    """
     source = read_text(path, LIMIT_BYTES, InputError)
     try:
         values = json.loads(source.text, parse_constant=_refused)
@@ -97,11 +117,8 @@ def read_json(path: Path, form: str) -> JsonRecord:
     except ValueError as wrong:
         raise InputError(f"{path} is not valid JSON: {' '.join(str(wrong).split())}") from None
     if not isinstance(values, dict):
-        raise InputError(f"{path} holds a {type(values).__name__}, expected an object with format {form!r}")
-    record = JsonRecord(values, path)
-    if values.get("format") != form:
-        raise record.wrong("format", f'"{form}"')
-    return record
+        raise InputError(f"{path} holds a {type(values).__name__}, expected an object{described}")
+    return JsonRecord(values, path)
 
 
 def _refused(word: str) -> float:

@@ -44,3 +44,13 @@ def test_the_line_is_cleared_when_the_work_fails() -> None:
     with pytest.raises(ZeroDivisionError):
         fail(stream)
     assert stream.getvalue().endswith("\r\x1b[K")
+
+
+def test_a_share_fills_the_bar_and_texts_of_files_do_nothing_to_the_terminal() -> None:
+    stream = Terminal()
+    with Progress(1, stream) as progress:
+        for done in (0.0, 0.5, 1.0, 1.7):
+            progress.share(done, "a\x1b[2J\nb" + "c" * 200)
+    lines = stream.getvalue().split("\r\x1b[K")[1:-1]
+    assert [line.count("#") for line in lines] == [0, 10, 20, 20]
+    assert all(line.isprintable() and len(line) < 100 for line in lines)
