@@ -75,6 +75,16 @@ class EndEffector:
         """Of shift and turn, everything together, (k, 6, 6)."""
         return self.own_covariance + self.shared @ self.placement_covariance @ np.swapaxes(self.shared, 1, 2)
 
+    def some(self, keep: np.ndarray) -> "EndEffector":
+        """Some of the poses, by index or flag; what is known of the body stays."""
+        return replace(
+            self,
+            seen=self.seen.some(keep),
+            pose=self.pose[keep],
+            own_covariance=self.own_covariance[keep],
+            shared=self.shared[keep],
+        )
+
 
 def measured_poses(campaign: Campaign, arm: CalibratedArm) -> EndEffector:
     """The measured poses of the tool (or, for a robot without one, of the middle of its targets).
@@ -126,12 +136,10 @@ def _as_the_arm_has_them(records: Standstills, arm: CalibratedArm) -> Array:
 
 def _selected(records: Standstills, keep: np.ndarray) -> Standstills:
     """Some of the standstills, with the targets that these show."""
-    points = records.points
-    shown = points.seen[keep].any(axis=0)
-    chosen = PointSets(
-        points.point_m[keep][:, shown], points.covariance_m2[keep][:, shown], points.seen[keep][:, shown]
-    )
-    return Standstills(records.pose[keep], records.commanded[keep], records.target[shown], chosen)
+    kept = records.some(keep)
+    points, shown = kept.points, kept.points.seen.any(axis=0)
+    chosen = PointSets(points.point_m[:, shown], points.covariance_m2[:, shown], points.seen[:, shown])
+    return replace(kept, target=kept.target[shown], points=chosen)
 
 
 def _judged(body: Array, seen: Standstills) -> tuple[float, Standstills, tuple[int, ...]]:

@@ -21,10 +21,22 @@ class Standstills:
     """Index of the pose in the campaign, ascending, (k,)."""
     commanded: Array
     """(k, n)."""
+    wanted: Array
+    """Commands by which the nominal arm would take the pose that was wanted; compensated ones differ, (k, n)."""
     target: np.ndarray
     """Which of the campaign's targets are on the last link and were seen, (j,)."""
     points: PointSets
     """Their points, repeated shots averaged, (k, j)."""
+
+    @property
+    def compensated(self) -> np.ndarray:
+        """Which were commanded otherwise than the nominal arm would be, boolean, (k,)."""
+        return np.abs(self.commanded - self.wanted).max(axis=1, initial=0.0) > SAME_COMMAND
+
+    def some(self, keep: np.ndarray) -> "Standstills":
+        """Some of the standstills, by index or flag, with the same targets."""
+        points = PointSets(self.points.point_m[keep], self.points.covariance_m2[keep], self.points.seen[keep])
+        return Standstills(self.pose[keep], self.commanded[keep], self.wanted[keep], self.target, points)
 
 
 def standstills(campaign: Campaign, noise_m: float) -> Standstills:
@@ -55,7 +67,15 @@ def standstills(campaign: Campaign, noise_m: float) -> Standstills:
     covariance = table.covariance_m2[rows]
     stated = np.isfinite(covariance).all(axis=(1, 2))
     covariance = np.where(stated[:, None, None], covariance, noise_m**2 * np.eye(3))
-    return Standstills(pose, table.commanded[first], target, _averaged(which, column, table.point_m[rows], covariance))
+    commanded = table.commanded[first]
+    wanted = commanded if table.wanted is None else table.wanted[first]
+    return Standstills(
+        pose=pose,
+        commanded=commanded,
+        wanted=np.where(np.isnan(wanted), commanded, wanted),
+        target=target,
+        points=_averaged(which, column, table.point_m[rows], covariance),
+    )
 
 
 def _averaged(row: np.ndarray, column: np.ndarray, point_m: Array, covariance: Array) -> PointSets:

@@ -31,35 +31,40 @@ COVERAGE = 2.0
 
 @dataclass(frozen=True)
 class Errors:
-    """Sizes of errors, a number a pose, with what is uncertain about them."""
+    """Sizes of errors, a number a pose, and what is uncertain about them; statistics of none are NaN."""
 
     value: Array
-    """(k,), m or rad."""
+    """(k,), m or rad; NaN where it was not measured."""
     std: Array
     """Standard uncertainty of each, (k,)."""
     mean_std: float
     """Standard uncertainty of their mean; what poses share does not average out."""
 
     @property
+    def known(self) -> Array:
+        """Those that were measured, (count,)."""
+        return self.value[np.isfinite(self.value)]
+
+    @property
     def count(self) -> int:
-        return len(self.value)
+        return len(self.known)
 
     @property
     def mean(self) -> float:
-        return float(np.mean(self.value))
+        return float(np.mean(self.known)) if self.count else np.nan
 
     @property
     def rms(self) -> float:
-        return float(np.sqrt(np.mean(self.value**2)))
+        return float(np.sqrt(np.mean(self.known**2))) if self.count else np.nan
 
     @property
     def p95(self) -> float:
         """The size that 95 of 100 errors do not exceed, by linear interpolation between them."""
-        return float(np.percentile(self.value, 95))
+        return float(np.percentile(self.known, 95)) if self.count else np.nan
 
     @property
     def max(self) -> float:
-        return float(np.max(self.value))
+        return float(np.max(self.known)) if self.count else np.nan
 
 
 @dataclass(frozen=True)
@@ -121,8 +126,8 @@ def verify(campaign: Campaign, arm: CalibratedArm, limits: Limits | None = None)
     _require_same_robot(campaign.robot, arm.nominal)
     measured = measured_poses(campaign, arm)
     commanded = measured.seen.commanded
-    nominal = _against(measured, arm, arm.nominal, nominal_net(arm.nominal, commanded))
-    calibrated = _against(measured, arm, arm.robot, arm.drives.net(commanded))
+    nominal = compared(measured, arm.base @ predicted(arm.nominal, nominal_net(arm.nominal, commanded), measured))
+    calibrated = compared(measured, arm.base @ predicted(arm.robot, arm.drives.net(commanded), measured))
     limits = Limits() if limits is None else limits
     return Verification(campaign, arm, measured, nominal, calibrated, limits, _notes(campaign, arm, measured))
 
@@ -153,8 +158,13 @@ def calibrated_verdict(found: Verification) -> str:
     return overall(each) if each else ""
 
 
-def _against(measured: EndEffector, arm: CalibratedArm, robot: Robot, net: Array) -> ModelErrors:
-    predicted = arm.base @ link_frames(robot, net)[:, -2] @ measured.on_link
+def predicted(robot: Robot, net: Array, measured: EndEffector) -> Array:
+    """Where a model has the reference frame for net displacements (k, n), in the robot's base, (k, 4, 4)."""
+    return link_frames(robot, net)[:, -2] @ measured.on_link
+
+
+def compared(measured: EndEffector, predicted: Array) -> ModelErrors:
+    """Measured poses less others in the instrument's frame, (k, 4, 4)."""
     shift = measured.pose[:, :3, 3] - predicted[:, :3, 3]
     turn = vectors_of_rotations(measured.pose[:, :3, :3] @ np.swapaxes(predicted[:, :3, :3], 1, 2))
     return ModelErrors(predicted, shift, turn, _errors(measured, shift, 0), _errors(measured, turn, 3))
@@ -167,7 +177,7 @@ def _errors(measured: EndEffector, vectors: Array, first: int) -> Errors:
     size = np.linalg.norm(vectors, axis=1)
     along = vectors / np.maximum(size, 1e-300)[:, None]
     variance = np.einsum("ki,kij,kj->k", along, measured.covariance[:, rows, rows], along)
-    count = len(vectors)
+    count = max(len(vectors), 1)
     pulled = np.einsum("ki,kij->j", along, shared) / count
     mean_variance = (
         np.einsum("ki,kij,kj->", along, own, along) / count**2 + pulled @ measured.placement_covariance @ pulled

@@ -44,7 +44,7 @@ USE = """
     core.driven_robot core.pose_iteration core.pose_seeds core.inverse_kinematics
     core.calibrated_arm core.calibration_file core.pose_files core.compensation
     core.rigid_pose core.standstills core.pose_visits core.end_effector
-    core.verification core.repeatability core.verification_json
+    core.verification core.pose_loop core.repeatability core.verification_json
     core.robot_export core.dh_export
 """
 APP = """
