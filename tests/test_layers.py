@@ -45,13 +45,13 @@ USE = """
     core.calibrated_arm core.calibration_file core.pose_files core.compensation
     core.rigid_pose core.standstills core.pose_visits core.end_effector
     core.verification core.pose_loop core.repeatability core.verification_json
-    core.robot_export core.dh_export
+    core.robot_export core.dh_export core.gap
 """
 APP = """
     app.paths app.progress app.output app.standard_output app.summary
-    app.figures app.report_page app.report_cells app.report_words app.report_tables app.report_html
+    app.figures app.report_page app.report_cells app.report_words app.report_tables app.captions app.report_html
     app.verification_report
-    app.scene app.workbench app.jobs app.words app.table_2 app.cell_view app.panels app.dashboard
+    app.scene app.workbench app.jobs app.spots app.clicks app.words app.table_2 app.cell_view app.panels app.dashboard
     app.commands app.__main__
 """
 ORDER = (FOUNDATION + FILES + CALIBRATION + SESSIONS + RESULTS + USE + APP).split()

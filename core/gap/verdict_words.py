@@ -1,0 +1,111 @@
+"""The verdict of a diagnosis in sentences for somebody who has to decide what to do."""
+
+import math
+
+from core.gap.place_words import cause_words, either_of, listed
+from core.gap.result import UNKNOWN, Cause, GapReport, Rivals, Verdict
+from core.wording import fixed
+
+FLOORS = {
+    "repeats": "as repeated measurements scatter",
+    "sigma": "by the noise of the instrument; no measurement was repeated to check it",
+    "unknown": "estimated from what no model explains; nothing was repeated",
+}
+
+
+def verdict_sentence(report: GapReport) -> str:
+    """What is known of the gap, in one sentence. Texts from files are in it as they are."""
+    gap, left, floor = (length_words(v) for v in (report.gap_rms_m, report.left_rms_m, report.noise.floor_rms_m))
+    match report.verdict:
+        case Verdict.NO_GAP:
+            return (
+                f"No gap beyond the noise: real and sim differ by {gap}, and {floor} is what noise and the arm's own "
+                "repeatability leave even with a perfect sim."
+            )
+        case Verdict.UNEXPLAINED:
+            return (
+                f"A gap of {gap} stands out of the noise ({floor}){_located(report)}, "
+                "and no effect that is known to the program accounts for it."
+            )
+        case Verdict.PARTLY_EXPLAINED:
+            return (
+                f"{_causes(report)} {_takes(report)} the gap from {gap} to {left}; "
+                f"what is left stands out of the noise ({floor}) and has no name."
+            )
+    return f"{_causes(report)} {_takes(report)} the gap from {gap} to {left}, which is down to the noise ({floor})."
+
+
+def length_words(length_m: float) -> str:
+    """A length in mm with three digits that count: 0.0312 mm, 4.51 mm."""
+    size = abs(length_m) * 1e3
+    if not math.isfinite(size):
+        return "an unknown length"
+    decimals = 3 if size == 0 else min(max(2 - math.floor(math.log10(size)), 1), 5)
+    return f"{fixed(length_m * 1e3, decimals)} mm"
+
+
+def percent(share: float) -> str:
+    """A share as per cent without decimals; what is not known is said to be so."""
+    return f"{fixed(100 * share, 0)} %" if math.isfinite(share) else "not known"
+
+
+def cause_sentence(cause: Cause) -> str:
+    """A cause, how sure it is, and what it accounts for."""
+    words = cause_words(cause)
+    apart = " (these data cannot tell which)" if len(cause.twins) > 1 else ""
+    change = f"{length_words(cause.gap_before_rms_m)} to {length_words(cause.gap_after_rms_m)}"
+    return (
+        f"{capital(words)}{apart}: probability {percent(cause.probability)}, {change}; "
+        f"{percent(cause.share_closed)} of the gap alone, {percent(cause.share_closed_last)} when added last."
+    )
+
+
+def closed_share(report: GapReport) -> float:
+    """Share of gap^2 - floor^2 that all causes together close, on kept-out points; NaN: there is no gap to close."""
+    floor = report.noise.floor_rms_m**2
+    gap = report.gap_rms_m**2 - floor
+    return 1.0 - (report.left_rms_m**2 - floor) / gap if gap > 0 else math.nan
+
+
+def left_sentence(report: GapReport) -> str:
+    """Whether what is left is noise, and how that was judged."""
+    test = report.left_test
+    judged = f" ({test.name}, p = {test.p_value:.2g})" if math.isfinite(test.p_value) else f" ({test.name})"
+    left = length_words(report.left_rms_m)
+    if test.left_is_noise:
+        return f"What is left, {left}, cannot be told from noise{judged if test.name else ''}."
+    return f"What is left, {left}, is not noise alone{judged if test.name else ''}."
+
+
+def next_sentence(rivals: Rivals) -> str:
+    """What to measure to tell rivals apart, and how well that would do it."""
+    if rivals.separation <= 0:
+        return f"{capital(listed_rivals(rivals))}: {rivals.next_measurement}"
+    return (
+        f"{capital(listed_rivals(rivals))}: {rivals.next_measurement} "
+        f"(expected to set them {rivals.separation:.1f} standard deviations apart)"
+    )
+
+
+def listed_rivals(rivals: Rivals) -> str:
+    """The causes that the data leave open, in words."""
+    return either_of(rivals.places)
+
+
+def capital(text: str) -> str:
+    """The text with a capital letter at its front."""
+    return text[:1].upper() + text[1:]
+
+
+def _causes(report: GapReport) -> str:
+    return capital(listed([cause_words(cause) for cause in report.causes])) or "Nothing"
+
+
+def _takes(report: GapReport) -> str:
+    return "take" if len(report.causes) > 1 else "takes"
+
+
+def _located(report: GapReport) -> str:
+    """Where an unknown sits, if that is known."""
+    places = [cause_words(c) for c in report.causes if c.place.effect == UNKNOWN]
+    return f" ({listed(places)})" if places else ""
