@@ -14,12 +14,12 @@ import numpy as np
 from core.calibration import Calibration, calibrate
 from core.calibration_json import calibration_to_json
 from core.geometry import Array
-from core.instruments import Desk, MeasureRequest
+from core.instruments import Desk, MeasureRequest, Reading
 from core.kinematics import nominal_net
 from core.live_sweep import LiveSweep, expected_point, live_sweep
 from core.session import Session
 from core.session_campaign import to_campaign
-from core.session_events import CheckShot, Failed, Judged, SessionError, Skipped, Solved, WentTo
+from core.session_events import CheckShot, Failed, Judged, SessionError, ShotTaken, Skipped, Solved, WentTo
 from core.session_plan import PlannedSweep, Step
 from core.session_shots import shot_at
 from core.session_state import Shot, State
@@ -106,6 +106,14 @@ class Workbench:
             shot = self._shoot(step, number, by)
         self.changed()
         return shot
+
+    def stopped(self) -> bool:
+        """Whether somebody pressed stop since the last run began."""
+        return self._stop.is_set()
+
+    def begin_run(self) -> None:
+        """Forget what was stopped before."""
+        self._stop.clear()
 
     def run(self, whole_plan: bool, by: str | None = None, progress: Callable[[int, int], None] | None = None) -> int:
         """Let the demo robot do this sweep, or all of them, until done or stopped; the number of shots taken."""
@@ -260,16 +268,55 @@ class Workbench:
         home = np.zeros(len(commanded)) if self.state.plan.home is None else np.array(self.state.plan.home)
         return nominal_net(self.cell.robot, np.array(commanded) - home)[0]
 
+    def take(
+        self,
+        commanded: tuple[float, ...],
+        start: tuple[float, ...] | None,
+        target: str,
+        shot_of: Callable[[Reading], ShotTaken],
+        by: str | None = None,
+    ) -> Shot:
+        """Send the robot somewhere and measure a target there; when this returns the shot is on the disk.
+
+        Args:
+            commanded: where to, rad or m, (n,).
+            start: where to go before that; None: straight on.
+            target: what to aim at.
+            shot_of: makes the event of what the instrument saw.
+            by: who asked; None: the session's operator.
+
+        Raises:
+            SessionError: the session is read-only.
+            InstrumentFailed: robot or instrument did not do it; this is noted in the session too.
+        """
+        with self._one_shot:
+            shot = self._take(commanded, start, target, shot_of, by)
+        self.changed()
+        return shot
+
     def _shoot(self, step: Step, replaces: int | None, by: str | None) -> Shot:
+        def shot_of(reading: Reading) -> ShotTaken:
+            return shot_at(step, reading, replaces=replaces)
+
+        return self._take(step.commanded, step.start, step.target, shot_of, by)
+
+    def _take(
+        self,
+        commanded: tuple[float, ...],
+        start: tuple[float, ...] | None,
+        target: str,
+        shot_of: Callable[[Reading], ShotTaken],
+        by: str | None,
+    ) -> Shot:
         try:
-            if step.start is not None:
-                self.robot.move_to(step.start, self._stop.is_set)
-            self.robot.move_to(step.commanded, lambda: False)
-            reading = self.desk.measure(MeasureRequest(step.target, step.commanded), TIMEOUT_S)
+            if start is not None:
+                self.robot.move_to(start, self._stop.is_set)
+            self.robot.move_to(commanded, lambda: False)
+            reading = self.desk.measure(MeasureRequest(target, commanded), TIMEOUT_S)
         except Exception as wrong:
             self.session.append(Failed(str(wrong) or type(wrong).__name__), by)
             raise
-        return self.session.append(shot_at(step, reading, replaces=replaces), by).shots[-1]
+        return self.session.append(shot_of(reading), by).shots[-1]
 
     def _left(self, first: Step | None, whole_plan: bool) -> int:
         closed = self.state.done | self.state.skipped.keys()
