@@ -92,6 +92,9 @@ class PointMeter(ABC):
 class RobotDriver(ABC):
     """A robot that goes where it is told."""
 
+    commanded: tuple[float, ...]
+    """Where it was sent last, rad or m, (n,)."""
+
     @abstractmethod
     def move_to(self, commanded: tuple[float, ...], cancelled: Cancelled) -> None:
         """Bring every joint to its command, rad or m, (n,).

@@ -10,11 +10,14 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from core.arc_needed import ArcNeeded, arc_needed
 from core.arm import slide, turn
 from core.axes import AxisFit, fit_axis
 from core.displacement import Displacements, displacements
 from core.errors import AxisUndefined, NotConverged
-from core.geometry import Array
+from core.geometry import Array, apply, invert
+from core.kinematics import link_frames
+from core.robot import Robot
 
 DOUBTFUL = 0.02
 """A shot that noise alone would put so far out less often than this is doubtful."""
@@ -44,6 +47,8 @@ class LiveSweep:
     """Chance that noise alone puts a shot so far out; NaN: too early to say."""
     displacements: Displacements | None
     """About the axis so far, from the first stop."""
+    lacks: ArcNeeded | None = None
+    """How much arc is missing, while there is no axis; None: it cannot be told, or there is an axis."""
 
     @property
     def last(self) -> Verdict:
@@ -72,7 +77,8 @@ def live_sweep(
     try:
         fit = fit_axis(points, sliding=sliding, target=target, covariance_m2=covariance_m2, commanded=command)
     except (AxisUndefined, NotConverged) as error:
-        return LiveSweep(None, str(error), (Verdict.EARLY,) * count, np.full(count, np.nan), None)
+        lacks = None if sliding else _lacking(points, command, target, covariance_m2)
+        return LiveSweep(None, str(error), (Verdict.EARLY,) * count, np.full(count, np.nan), None, lacks)
     judged = fit.degrees_of_freedom >= 3
     chances = fit.outlier_probability if judged else np.full(count, np.nan)
     moved = displacements(fit, points, target=target, commanded=command)
@@ -91,6 +97,23 @@ def expected_point(fit: AxisFit, last_point_m: ArrayLike, step: float) -> Array:
     return move(fit.line, np.array([step]), np.asarray(last_point_m, dtype=float)[None, :])[0]
 
 
+def carried_point(
+    robot: Robot, base: Array, link: int, point_m: ArrayLike, before: ArrayLike, after: ArrayLike
+) -> Array:
+    """Where the nominal arm carries a point of a link from one configuration to another, (3,).
+
+    Args:
+        base: from the robot's base frame to the frame of the point, (4, 4).
+        link: that the point rides on, 0: it stays.
+        point_m: where it is before, (3,).
+        before, after: net displacements, rad or m, (n,).
+    """
+    if link == 0:
+        return np.asarray(point_m, dtype=float)
+    first, second = base @ link_frames(robot, np.stack([before, after]))[:, link - 1]
+    return apply(second @ invert(first), point_m)
+
+
 def place_std_at(fit: AxisFit, point_m: ArrayLike) -> float:
     """Standard uncertainty of the axis' place where it passes a point, say the tool, in metres; NaN where it slides."""
     if fit.sliding:
@@ -98,6 +121,20 @@ def place_std_at(fit: AxisFit, point_m: ArrayLike) -> float:
     along = float((np.asarray(point_m) - fit.line.point_m) @ fit.line.direction)
     carry = np.hstack([along * np.eye(2), np.eye(2)])
     return float(np.sqrt(np.trace(carry @ fit.covariance @ carry.T)))
+
+
+def _lacking(
+    points_m: Array, commanded: Array, target: ArrayLike | None, covariance_m2: ArrayLike | None
+) -> ArcNeeded | None:
+    """What the target with the most shots lacks."""
+    if len(points_m) == 0:
+        return None
+    which = np.zeros(len(points_m), dtype=int) if target is None else np.asarray(target)
+    mine = which == np.bincount(which).argmax()
+    sigma = None
+    if covariance_m2 is not None:
+        sigma = float(np.sqrt(np.trace(np.asarray(covariance_m2), axis1=1, axis2=2).mean() / 3))
+    return arc_needed(points_m[mine], commanded[mine], sigma)
 
 
 def _verdict(chance: float) -> Verdict:

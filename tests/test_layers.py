@@ -25,13 +25,15 @@ CALIBRATION = """
     core.motion_forms core.arm core.function_fit core.drives core.transmission
     core.estimate core.phi_uncertainty core.arm_jacobian core.coupling
     core.walk_from_base core.joint_by_joint core.refinement_problem core.refined_curves core.refinement
-    core.live_sweep core.findings core.calibration
+    core.arc_needed core.live_sweep core.base_placement core.findings core.calibration
 """
 SESSIONS = """
-    core.instruments core.session_robot core.session_values core.session_journal core.session_plan
+    core.instruments core.by_hand core.point_lines
+    core.session_robot core.session_values core.session_journal core.session_plan
     core.session_poses
     core.session_events core.suggested_plan
     core.session_entries core.session_import core.session_shots core.session_state
+    core.session_conditions core.entered_shots
     core.session_lock core.session_store core.session_checks core.session_fold core.session_reader
     core.session_timeline core.session core.session_library core.session_campaign
 """

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from core.geometry import Line
-from core.live_sweep import Verdict, expected_point, live_sweep, place_std_at
+from core.geometry import Line, rotation_about
+from core.live_sweep import Verdict, carried_point, expected_point, live_sweep, place_std_at
+from core.twin import irb_l6
 
 SIGMA = 1e-4
 AXIS = Line(np.array([1.0, 2.0, 0.5]), np.array([0.2, -0.1, 1.0]))
@@ -73,3 +74,27 @@ def test_the_place_of_the_axis_is_best_known_at_its_arc():
     here = place_std_at(fit, fit.line.point_m)
     assert here == pytest.approx(fit.point_std_m)
     assert place_std_at(fit, fit.line.point_m + fit.line.direction) > here
+
+
+def test_an_arc_that_is_too_short_says_how_long_it_must_be():
+    points, command = shots(count=6, span_deg=1.0)
+    live = live_sweep(points, command)
+    assert live.fit is None
+    assert live.lacks.needed_rad > np.deg2rad(1.0)
+    assert live.lacks.more_shots > 0
+    assert live_sweep(*shots()).lacks is None
+
+
+def test_the_nominal_arm_carries_a_point_as_the_cell_does():
+    cell = irb_l6.cell()
+    base, robot = cell.truth.base, cell.robot
+    before, after = np.zeros(6), np.deg2rad([10.0, -5.0, 7.0, 3.0, 20.0, -8.0])
+    point = base[:3, 3] + [0.4, 0.5, 0.3]
+    for link in range(7):
+        there = carried_point(robot, base, link, point, before, after)
+        assert carried_point(robot, base, link, there, after, before) == pytest.approx(point)
+    # Link 1 turns about axis 1, which is the base frame's z.
+    first = carried_point(robot, base, 1, point, before, after)
+    local = (point - base[:3, 3]) @ base[:3, :3]
+    turned = rotation_about([0.0, 0.0, 1.0], after[0]) @ local
+    assert first == pytest.approx(base[:3, :3] @ turned + base[:3, 3])
