@@ -1,5 +1,6 @@
 """The cell in 3-D: the arm as it stands, its nominal ghost, instruments, shots and axes, kept up with the workbench."""
 
+import threading
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,13 +13,16 @@ from app.scene.dimensions import fitting_exaggeration
 from app.scene.error_vectors import ErrorVectors
 from app.scene.floor import draw_floor, floor_height, floor_under
 from app.scene.points import PointMarks, PointsView, Verdict
+from app.scene.poses import together
 from app.scene.robot import RobotView
 from app.scene.stage import prepare_stage
 from app.scene.stations import Station, StationsView
+from app.spots import Spot
 from app.workbench import Workbench
 from core.calibration import Calibration
 from core.estimate import ArmEstimate
 from core.geometry import Array
+from core.robot import Joint
 from core.twin.instruments import TheodolitePair
 
 if TYPE_CHECKING:
@@ -57,6 +61,10 @@ class CellView:
         self._axes: AxesView | None = None
         self._diagnosis: DiagnosisView | None = None
         self._diagnosed = False
+        self._exaggeration = 20.0
+        self._moving = threading.Lock()
+        self.commanded: tuple[float, ...] = self._bench.robot.commanded
+        """Where the arms are drawn."""
         self.drawn: Calibration | None = None
         """The calibration that is shown."""
         self.scale = ResidualScale(1e-3)
@@ -64,17 +72,28 @@ class CellView:
         self.shown_shots: tuple[int, ...] = ()
         """Ids of the shots in the rows of ``points``."""
 
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Of the robot that is drawn."""
+        return self._bench.cell.robot.joints
+
     def cameras(self) -> tuple[Camera, ...]:
         """Where to look from, for the arm as it stands."""
         return presets(self.arm.bones, self.arm.net, self._stations, self._floor_m)
 
     def follow(self, commanded: tuple[float, ...]) -> None:
         """Show the arms where commands put them."""
-        net = self._bench.nominal_net(commanded)
-        self.arm.show(net)
-        self.ghost.show(net)
-        if self._axes is not None:
-            self._axes.show(net)
+        with self._moving:
+            self.commanded = tuple(commanded)
+            net = self._bench.nominal_net(commanded)
+            with together(self._scene):
+                for view in (self.arm, self.ghost, self._axes):
+                    if view is not None:
+                        view.show(net)
+
+    def follow_robot(self) -> None:
+        """Show the arms where the robot is."""
+        self.follow(self._bench.robot.commanded)
 
     def show_shots(self) -> None:
         """Show every shot of the session, coloured by verdict; the last one marked."""
@@ -95,6 +114,9 @@ class CellView:
         """Show the fitted axes with their uncertainty, the nominal arm as a ghost, and the residuals."""
         self.drawn = found
         self.scale = ResidualScale.over(found.refinement.residuals.radial_m)
+        geometry = found.estimate.geometry
+        if geometry is not None and found.nominal is not None:
+            self._exaggeration = fitting_exaggeration(found.nominal, geometry, self.arm.bones.reach_m)
         marks = axis_marks(found.estimate)
         self._axes = AxesView(self._scene, "/axes", marks, self._bench.cell.robot.sliding, length_m=0.7)
         residuals = found.refinement.residuals
@@ -105,7 +127,7 @@ class CellView:
             self._diagnosis = None
         self.diagnose(self._diagnosed)
         self.show_shots()
-        self.follow(self._bench.robot.commanded)
+        self.follow_robot()
 
     def forget(self) -> None:
         """Take away what a solution has drawn."""
@@ -121,7 +143,18 @@ class CellView:
         self.arm.opacity = None
         self.errors.show(np.zeros((0, 3)), np.zeros((0, 3)))
 
-    def diagnose(self, wanted: bool, exaggeration: float | None = None) -> None:
+    @property
+    def exaggeration(self) -> float:
+        """How many times too large the differences of the geometry are drawn."""
+        return self._exaggeration
+
+    @exaggeration.setter
+    def exaggeration(self, factor: float) -> None:
+        self._exaggeration = factor
+        if self._diagnosis is not None:
+            self._diagnosis.exaggeration = factor
+
+    def diagnose(self, wanted: bool) -> None:
         """Show nominal and actual geometry together, every significant difference as a dimension with its value."""
         self._diagnosed = wanted
         found = self.drawn
@@ -132,24 +165,32 @@ class CellView:
             camera = next(c for c in self.cameras() if c.name == "Arm")
             way = camera.position_m - camera.look_at_m
             direction = way / np.linalg.norm(way)
-            fitting = fitting_exaggeration(found.nominal, geometry, reach)
             self._diagnosis = DiagnosisView(
-                self._scene,
-                found.nominal,
-                geometry,
-                geometry.base,
-                reach,
-                fitting,
-                direction / np.linalg.norm(direction),
+                self._scene, found.nominal, geometry, geometry.base, reach, self._exaggeration, direction
             )
         if self._diagnosis is not None:
             self._diagnosis.visible = wanted
-            if exaggeration is not None:
-                self._diagnosis.exaggeration = exaggeration
         shown = wanted and self._diagnosis is not None
         self.arm.opacity = 0.35 if shown else None
         if self._axes is not None:
             self._axes.labels_visible = not shown
+
+    def light(self, spot: Spot | None) -> None:
+        """Draw what a result speaks of in the colour of attention: a dimension, or the axis of a joint; None: none."""
+        if self._diagnosis is not None:
+            shown = spot is not None and self._diagnosis.has(spot.number, spot.parameter)
+            self._diagnosis.highlight(spot.number if shown else None, spot.parameter if shown else "")
+        if self._axes is not None:
+            joint = spot is not None and not spot.parameter and spot.number <= len(self.arm.axes)
+            self._axes.highlight(spot.number if joint else None)
+
+    def camera_at(self, spot: Spot) -> Camera | None:
+        """Where to see it from; None: it is not drawn."""
+        if not spot.parameter:
+            return next((c for c in self.cameras() if c.name == f"Joint {spot.number}"), None)
+        if self._diagnosis is None or not self._diagnosis.has(spot.number, spot.parameter):
+            return None
+        return self._diagnosis.camera(spot.number, spot.parameter)
 
     def _colours(self, records: list[int]) -> Array:
         """Colours of shots: by radial residual of the last solution, plain before there is one, (k, 3)."""

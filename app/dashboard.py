@@ -14,6 +14,7 @@ from pathlib import Path
 import viser
 
 from app.cell_view import CellView
+from app.clicks import Ear
 from app.jobs import Jobs
 from app.panels.acquire import AcquirePanel
 from app.panels.check import CheckPanel
@@ -23,6 +24,8 @@ from app.panels.seat import Seat
 from app.panels.solve import SolvePanel
 from app.panels.start import StartPanel
 from app.panels.view import ViewPanel
+from app.scene.cameras import fly_to
+from app.spots import spot_named
 from app.words import STYLE
 from app.workbench import Workbench
 from core.errors import InputError
@@ -50,6 +53,7 @@ class Dashboard:
         gui.main_panel.dock_left()
         gui.main_panel.set_width(390)
         gui.add_html(STYLE)
+        self.ear = Ear(gui, self._said)
         self.seat.build(gui)
         tabs = gui.add_tab_group()
         with tabs.add_tab("1 Cell"):
@@ -63,7 +67,7 @@ class Dashboard:
         with tabs.add_tab("4 Export"):
             self.export = ExportPanel(gui, bench, self.ask)
         with tabs.add_tab("View"):
-            self.view = ViewPanel(gui, self.cell, self._darken)
+            self.view = ViewPanel(gui, self.cell, self._darken, self._may)
         self.results = ResultsPanel(gui, bench, self.ask)
         self.cell.points.on_click(self._clicked)
         bench.on_change(self.refresh)
@@ -74,10 +78,17 @@ class Dashboard:
     def ask(self, event: "viser.GuiEvent | None", job, operator: bool = True) -> None:
         """Queue a job for the worker on behalf of whoever pressed something; watchers are told that they only watch."""
         client = getattr(event, "client", None)
-        if operator and client is not None and not self.seat.may(client.client_id):
-            client.add_notification("You are watching", self.seat.why_not(), color="orange", auto_close_seconds=6)
+        if operator and not self._may(event):
             return
         self.jobs.ask(lambda: job(client), lambda sentence: self.say(client, sentence))
+
+    def _may(self, event: "viser.GuiEvent | None") -> bool:
+        """Whether who pressed something may act; watchers are told that they only watch."""
+        client = getattr(event, "client", None)
+        if client is None or self.seat.may(client.client_id):
+            return True
+        client.add_notification("You are watching", self.seat.why_not(), color="orange", auto_close_seconds=6)
+        return False
 
     def say(self, client: "viser.ClientHandle | None", sentence: str) -> None:
         """Tell whoever asked, or everybody, what went wrong."""
@@ -91,7 +102,7 @@ class Dashboard:
             if self.bench.calibration is None:
                 self.cell.forget()
             self.cell.show_shots()
-            self.cell.follow(self.bench.robot.commanded)
+            self.cell.follow_robot()
             self.start.refresh()
             self.check.refresh()
             self.acquire.refresh()
@@ -120,6 +131,17 @@ class Dashboard:
         camera = next(c for c in self.cell.cameras() if c.name == "Arm")
         first = self.server.initial_camera
         first.position, first.look_at, first.up = (tuple(v) for v in (camera.position_m, camera.look_at_m, camera.up))
+
+    def _said(self, client: viser.ClientHandle, word: str) -> None:
+        """A finding or a row of table 2 was clicked: show it where it is, and fly there."""
+        spot = spot_named(word)
+        if spot is None:
+            return
+        if self.seat.may(client.client_id):
+            self.view.light(spot)
+        camera = self.cell.camera_at(spot)
+        if camera is not None:
+            fly_to(client, camera)
 
     def _clicked(self, row: int, client_id: int) -> None:
         """A shot was clicked in 3-D: choose it in the measuring panel."""

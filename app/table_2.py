@@ -5,7 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.clicks import listening, saying
+from app.spots import Spot
 from app.words import block
+from core.phi_model import PARAMETERS
 
 if TYPE_CHECKING:
     from core.calibration import Calibration
@@ -34,7 +37,7 @@ def table_2(found: "Calibration", limits: Limits) -> str:
         return block(f"<p class='soft'>The geometry needs every joint; not swept yet: {missing}.</p>", "table2")
     rows = "".join(
         _row(
-            k,
+            Spot(i + 1, PARAMETERS[k]),
             f"{NAMES[k]}<sub>{i + 1}</sub>",
             found.nominal.parameters[i, k],
             geometry.model.parameters[i, k],
@@ -47,9 +50,11 @@ def table_2(found: "Calibration", limits: Limits) -> str:
     numbers = "".join(f"<th class='n'>{name}</th>" for name in ("Nominal", "Actual", "Difference", "±u"))
     note = (
         "<p class='soft'>▲ deviates by more than two standard uncertainties u. Parameters fixed by convention are left "
-        "out. A limit is kept (✔) or broken (✖) where two u do not reach across it; else it is open (?).</p>"
+        "out. A limit is kept (✔) or broken (✖) where two u do not reach across it; else it is open (?). Click a row "
+        "to see it in 3-D.</p>"
     )
-    return block(f"<table><tr><th></th>{numbers}<th></th><th></th><th>Limit</th></tr>{rows}</table>{note}", "table2")
+    table = f"<table><tr><th></th>{numbers}<th></th><th></th><th>Limit</th></tr>{rows}</table>"
+    return block(listening(table) + note, "table2")
 
 
 def verdict(difference: float, u: float, limit: float) -> str:
@@ -63,13 +68,13 @@ def verdict(difference: float, u: float, limit: float) -> str:
     return "<span class='doubt'>?</span>"
 
 
-def _row(k: int, name: str, nominal: float, actual: float, std: float, limits: Limits) -> str:
-    scale, unit = SCALES[k]
+def _row(spot: Spot, name: str, nominal: float, actual: float, std: float, limits: Limits) -> str:
+    scale, unit = SCALES[PARAMETERS.index(spot.parameter)]
     difference, u = (actual - nominal) * scale, std * scale
     digits = int(np.clip(1 - np.floor(np.log10(u)), 0, 4))
     mark = "<span class='bad'>▲</span>" if abs(difference) > SIGNIFICANT * u else "○"
     return (
-        f"<tr><td>{name}</td><td class='n'>{nominal * scale:z.{digits}f}</td>"
+        f"<tr {saying(spot.word, 'Show it in 3-D')}><td>{name}</td><td class='n'>{nominal * scale:z.{digits}f}</td>"
         f"<td class='n'>{actual * scale:z.{digits}f}</td><td class='n'>{difference:+.{digits}f}</td>"
         f"<td class='n'>{u:.{digits}f}</td><td>{unit}</td><td>{mark}</td>"
         f"<td>{verdict(difference, u, limits.of(unit))}</td></tr>"

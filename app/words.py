@@ -4,7 +4,10 @@ from html import escape
 
 import numpy as np
 
+from app.clicks import listening, saying
+from app.spots import spot_of
 from app.workbench import SweepProgress
+from core.findings import Finding
 from core.live_sweep import LiveSweep, Verdict
 from core.robot import Robot
 from core.session_state import Shot, State
@@ -94,13 +97,17 @@ def verdict_words(live: LiveSweep, shots: tuple[Shot, ...], joint: int) -> str:
     return block(text, "verdict")
 
 
-def findings_words(sentences: list[tuple[str, bool]]) -> str:
-    """Findings as a list, significant ones marked by sign and colour."""
-    items = "".join(
-        f"<li class='{'bad' if significant else 'soft'}'>{'▲ ' if significant else '○ '}{escape(text)}</li>"
-        for text, significant in sentences
-    )
-    return block(f"<ul style='padding-left:18px;margin:4px 0'>{items}</ul>", "findings")
+def findings_words(findings: tuple[Finding, ...]) -> str:
+    """Findings as a list, significant ones marked by sign and colour; a click shows where it is."""
+    items = "".join(_finding(finding) for finding in findings)
+    return block(listening(f"<ul style='padding-left:18px;margin:4px 0'>{items}</ul>"), "findings")
+
+
+def _finding(finding: Finding) -> str:
+    spot = spot_of(finding)
+    where = "" if spot is None else saying(spot.word, "Show it in 3-D")
+    look, sign = ("bad", "▲") if finding.significant else ("soft", "○")
+    return f"<li class='{look}' {where}>{sign} {escape(finding.text)}</li>"
 
 
 def _command(robot: Robot, k: int, value: float) -> str:

@@ -122,9 +122,9 @@ def lines_of_legend(traces: Sequence[Mapping | go.Scatter], width_px: int) -> in
     """How many lines the legend of traces takes, by the widths of their names."""
     lines, at = 1, 0.0
     for trace in traces:
-        name, shown = (trace[key] if key in trace else None for key in ("name", "showlegend"))
-        if shown is False:
+        if "showlegend" in trace and trace["showlegend"] is False:
             continue
+        name = trace["name"] if "name" in trace else None  # noqa: SIM401 (traces of plotly have no get)
         width = 48 + 6.3 * len(name or "")
         if at > 0 and at + width > width_px - 8:
             lines, at = lines + 1, 0.0

@@ -4,14 +4,17 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-import plotly.graph_objects as go
 import viser
 
+from app.captions import all_residuals_caption, coupling_caption, drive_caption, residual_caption
+from app.figures.axis_uncertainty import axis_uncertainty_figure
+from app.figures.couplings import coupling_figure
 from app.figures.deviations import deviations_figure
 from app.figures.live import live_figure
+from app.figures.over_time import over_time_figure
 from app.figures.residuals import residual_figure
-from app.figures.style import CONFIG, in_theme
 from app.figures.transmissions import transmission_figure
+from app.panels.plot_box import WIDTH_PX, PlotBox
 from app.table_2 import Limits, table_2
 from app.words import block
 from app.workbench import Workbench
@@ -21,47 +24,73 @@ from core.session_events import Setting
 if TYPE_CHECKING:
     from core.calibration import Calibration
 
-WIDTH_PX = 520
 LIMITS = {"limit_length_mm": "Limit for lengths [mm]", "limit_angle_deg": "Limit for angles [deg]"}
 """Keys of the session's settings, and what they are called."""
+OVER_TIME = "all sweeps over time"
+NEEDS_ALL = "Solve with a sweep of every joint to compare the arm with its design."
 
 
 class ResultsPanel:
-    """Tabs: live, residuals, drives, geometry."""
+    """Tabs: live, residuals, drives, axes, geometry."""
 
     def __init__(self, gui: viser.GuiApi, bench: Workbench, ask: Callable) -> None:
         self._bench, self._ask = bench, ask
         self.drawn: Calibration | None = None
-        self._live_key: tuple = ()
-        self._dark = False
+        self._live_key: tuple | None = None
         panel = gui.add_panel()
         with panel.add_tab("This sweep"):
-            self._live = _plot(gui, _empty("Measure a shot to see its residuals here"))
+            self._live = PlotBox(gui, "live", "Measure a shot to see its residuals here.")
         with panel.add_tab("Residuals"):
-            self._sweep = gui.add_dropdown("Sweep", ("-",))
-            self._sweep.on_update(lambda _: self._draw_sweep())
-            self._residuals = _plot(gui, _empty("Solve to see residuals"))
+            self._sweep = gui.add_dropdown("Show", ("-",))
+            self._sweep.on_update(lambda event: self._draw_residuals() if event.client else None)
+            self._residuals = PlotBox(gui, "residuals", "Solve to see residuals.")
         with panel.add_tab("Drives"):
-            self._joint = gui.add_dropdown("Joint", ("-",))
-            self._joint.on_update(lambda _: self._draw_joint())
-            self._drive = _plot(gui, _empty("Solve to see what the drives do"))
+            self._curve = gui.add_dropdown("Show", ("-",))
+            self._curve.on_update(lambda event: self._draw_curve() if event.client else None)
+            self._drive = PlotBox(gui, "drives", "Solve to see what drives and couplings do.")
+        with panel.add_tab("Axes"):
+            self._axes = PlotBox(gui, "axes", "Solve to see how well every axis is known.")
         with panel.add_tab("Geometry"):
-            self._deviations = _plot(gui, _empty("Solve every joint to compare with the design"))
-            self._table = gui.add_html(
-                block("<p class='soft'>Solve every joint to compare with the design.</p>", "table2")
-            )
-            self._limits = {
-                key: gui.add_number(label, float(bench.state.settings.get(key, 0.0)), min=0.0, max=1e4, step=0.001)
-                for key, label in LIMITS.items()
-            }
-            gui.add_button("Keep limits", hint="0: no limit").on_click(self._keep_limits)
+            self._build_geometry(gui)
         panel.dock_right()
         panel.set_width(540)
 
+    def _build_geometry(self, gui: viser.GuiApi) -> None:
+        self._deviations = PlotBox(gui, "deviations", NEEDS_ALL)
+        self._table = gui.add_html(block("", "table2"))
+        settings = self._bench.state.settings
+        self._limits = {
+            key: gui.add_number(label, float(settings.get(key, 0.0)), min=0.0, max=1e4, step=0.001)
+            for key, label in LIMITS.items()
+        }
+        gui.add_button("Keep limits", hint="0: no limit").on_click(self._keep_limits)
+
     def show_dark(self, dark: bool) -> None:
-        """Draw everything anew for a dark or a light page."""
-        self._dark, self._live_key, self.drawn = dark, (), None
-        self.refresh()
+        """Draw everything for a dark or a light page."""
+        for box in (self._live, self._residuals, self._drive, self._axes, self._deviations):
+            box.show_dark(dark)
+
+    def refresh(self) -> None:
+        """Draw what has changed."""
+        self._draw_live()
+        found = self._bench.calibration
+        if found is self.drawn:
+            return
+        self.drawn = found
+        if found is None:
+            self._forget()
+            return
+        _offer(self._sweep, (*(f.sweep.name for f in found.found.fits), OVER_TIME))
+        _offer(self._curve, tuple(_curves(found)))
+        self._draw_residuals()
+        self._draw_curve()
+        self._axes.show(axis_uncertainty_figure(found, WIDTH_PX))
+        figure = deviations_figure(found)
+        if figure is None:
+            self._deviations.clear()
+        else:
+            self._deviations.show(figure)
+        self._draw_table()
 
     def _keep_limits(self, event: viser.GuiEvent) -> None:
         asked = {key: box.value for key, box in self._limits.items()}
@@ -82,32 +111,11 @@ class ResultsPanel:
             limits = Limits(*(float(settings.get(key, 0.0)) for key in LIMITS))
             self._table.content = table_2(self.drawn, limits)
 
-    def refresh(self) -> None:
-        """Draw what has changed."""
-        self._draw_live()
-        found = self._bench.calibration
-        if found is self.drawn:
-            return
-        self.drawn = found
-        if found is None:
-            self._forget()
-            return
-        sweeps = tuple(f.sweep.name for f in found.found.fits)
-        joints = tuple(str(j) for j in found.found.swept)
-        _offer(self._sweep, sweeps)
-        _offer(self._joint, joints)
-        self._draw_sweep()
-        self._draw_joint()
-        figure = deviations_figure(found)
-        self._show(self._deviations, figure or _empty("Solve every joint to compare with the design"))
-        self._draw_table()
-
     def _forget(self) -> None:
-        """Empty plots, as before the first solution."""
-        self._show(self._residuals, _empty("Solve to see residuals"))
-        self._show(self._drive, _empty("Solve to see what the drives do"))
-        self._show(self._deviations, _empty("Solve every joint to compare with the design"))
-        self._table.content = block("<p class='soft'>Solve every joint to compare with the design.</p>", "table2")
+        """Empty, as before the first solution."""
+        for box in (self._residuals, self._drive, self._axes, self._deviations):
+            box.clear()
+        self._table.content = block("", "table2")
 
     def _draw_live(self) -> None:
         state = self._bench.state
@@ -117,44 +125,48 @@ class ResultsPanel:
             return
         self._live_key = key
         if last is None:
-            self._show(self._live, _empty("Measure a shot to see its residuals here"))
+            self._live.clear()
             return
         joint = last.taken.joint
         live, shots = self._bench.live(joint, last.taken.sweep)
         command = np.array([s.taken.commanded[joint - 1] for s in shots])
         sliding = bool(self._bench.cell.robot.sliding[joint - 1])
-        self._show(self._live, live_figure(live, command, joint, sliding, WIDTH_PX))
+        self._live.show(live_figure(live, command, joint, sliding, WIDTH_PX), live.waiting_for)
 
-    def _draw_sweep(self) -> None:
+    def _draw_residuals(self) -> None:
         found = self.drawn
-        if found is not None:
-            names = [f.sweep.name for f in found.found.fits]
-            if self._sweep.value in names:
-                self._show(self._residuals, residual_figure(found, names.index(self._sweep.value)))
+        if found is None:
+            return
+        names = [f.sweep.name for f in found.found.fits]
+        if self._sweep.value in names:
+            index = names.index(self._sweep.value)
+            self._residuals.show(residual_figure(found, index), residual_caption(found, index))
+        elif self._sweep.value == OVER_TIME:
+            self._residuals.show(over_time_figure(found, WIDTH_PX), all_residuals_caption(found))
 
-    def _draw_joint(self) -> None:
+    def _draw_curve(self) -> None:
         found = self.drawn
-        if found is not None and self._joint.value in {str(j) for j in found.found.swept}:
-            self._show(self._drive, transmission_figure(found, int(self._joint.value)))
+        asked = None if found is None else _curves(found).get(self._curve.value)
+        if found is None or asked is None:
+            return
+        joint, coupled = asked
+        if coupled:
+            self._drive.show(coupling_figure(found, joint), coupling_caption(found, joint))
+        else:
+            self._drive.show(transmission_figure(found, joint), drive_caption(found, joint))
 
-    def _show(self, plot: viser.GuiPlotlyHandle, figure: go.Figure) -> None:
-        plot.figure = in_theme(figure, self._dark)
 
-
-def _plot(gui: viser.GuiApi, figure: go.Figure) -> viser.GuiPlotlyHandle:
-    return gui.add_plotly(figure, aspect=0.8, config=CONFIG)
+def _curves(found: "Calibration") -> dict[str, tuple[int, bool]]:
+    """What can be shown of drives and couplings: the words of the list, the joint, whether the coupling is meant."""
+    drives = {f"joint {j}: drive": (j, False) for j in found.found.swept}
+    seen = [j for j, fit in enumerate(found.estimate.couplings, 1) if fit is not None]
+    return drives | {f"joint {j}: dragged along by joint {j - 1}": (j, True) for j in seen}
 
 
 def _offer(dropdown: viser.GuiDropdownHandle, options: tuple[str, ...]) -> None:
+    """Give a list other options; what was chosen stays chosen if it is still there."""
+    if tuple(dropdown.options) == options:
+        return
     chosen = dropdown.value
     dropdown.options = options
     dropdown.value = chosen if chosen in options else options[0]
-
-
-def _empty(text: str) -> go.Figure:
-    figure = go.Figure()
-    figure.add_annotation(text=text, showarrow=False, font={"size": 14, "color": "#6b7280"})
-    figure.update_layout(
-        template="none", xaxis={"visible": False}, yaxis={"visible": False}, margin={"l": 10, "r": 10, "t": 10, "b": 10}
-    )
-    return figure

@@ -58,4 +58,4 @@ def _summary(found: "Calibration", before: "Calibration | None") -> str:
         text += f"<p class='doubt'>Not swept yet: joint {missing}. The geometry needs them all.</p>"
     for rejection in found.rejected:
         text += f"<p class='doubt'>Record {rejection.record} left out: {escape(rejection.reason)}.</p>"
-    return block(text, "solution-box") + findings_words([(f.text, f.significant) for f in found.findings])
+    return block(text, "solution-box") + findings_words(found.findings)

@@ -4,45 +4,61 @@ from collections.abc import Callable
 from html import escape
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from app.cell_view import CellView
 from app.scene.cameras import fly_to
 from app.scene.colours import hex_of
+from app.spots import Spot
 from app.words import block
 
 if TYPE_CHECKING:
     import viser
 
-MAGNIFICATIONS = ("50", "100", "200", "500", "1000")
+MAGNIFICATION = (10, 1000, 10)
+EXAGGERATION = (1, 500, 1)
+"""Least, most and step of how many times too large residuals and differences are drawn."""
+WIDEST = 720.0
+"""Deg or mm, of a slider for a joint without limits."""
+KEYS = (
+    ("Space", "Measure the next shot"),
+    ("R", "Measure the chosen shot again"),
+    ("Backspace", "Undo"),
+    ("S", "Solve"),
+)
 
 
 class ViewPanel:
-    """Switches, magnification, cameras, and the keys."""
+    """Switches, magnification, cameras, the pose that is drawn, and the keys."""
 
-    def __init__(self, gui: "viser.GuiApi", cell: CellView, on_dark: Callable[[bool], None]) -> None:
-        self._cell = cell
+    def __init__(
+        self,
+        gui: "viser.GuiApi",
+        cell: CellView,
+        on_dark: Callable[[bool], None],
+        may: Callable[["viser.GuiEvent"], bool],
+    ) -> None:
+        """``may`` says whether who changed something may do so: what is drawn is drawn for all."""
+        self._cell, self._may = cell, may
         names = tuple(camera.name for camera in cell.cameras())
         self._camera = gui.add_dropdown("Look at", names, initial_value=names[0])
         self._camera.on_update(self._fly)
         self._ghost = gui.add_checkbox("Nominal arm as a ghost", False)
-        self._ghost.on_update(lambda _: setattr(cell.ghost, "visible", bool(self._ghost.value)))
         self._errors = gui.add_checkbox("Residual vectors", False)
-        self._errors.on_update(lambda _: setattr(cell.errors, "visible", bool(self._errors.value)))
-        self._times = gui.add_dropdown("Residuals magnified", MAGNIFICATIONS, initial_value="200")
-        self._times.on_update(self._magnify)
+        self._times = self._slider(gui, "Residuals ×", MAGNIFICATION, 200, self._magnify)
         self._geometry = gui.add_checkbox("Geometry against design", False, hint="After solving every joint.")
-        self._geometry.on_update(lambda _: cell.diagnose(bool(self._geometry.value)))
-        self._swell = gui.add_dropdown("Differences enlarged", ("10", "20", "50", "100"), initial_value="20")
-        self._swell.on_update(self._enlarge)
+        self._swell = self._slider(gui, "Differences ×", EXAGGERATION, 20, self._enlarge)
         self._dark = gui.add_checkbox("Dark theme", False)
-        self._dark.on_update(lambda _: on_dark(bool(self._dark.value)))
+        self._obey(self._ghost, lambda: setattr(cell.ghost, "visible", bool(self._ghost.value)))
+        self._obey(self._errors, lambda: setattr(cell.errors, "visible", bool(self._errors.value)))
+        self._obey(self._geometry, lambda: cell.diagnose(bool(self._geometry.value)))
+        self._obey(self._dark, lambda: on_dark(bool(self._dark.value)))
         self._legend = gui.add_html("")
-        keys = (
-            ("Space", "Measure the next shot"),
-            ("R", "Measure the chosen shot again"),
-            ("Backspace", "Undo"),
-            ("S", "Solve"),
-        )
-        rows = "".join(f"<tr><td><b>{key}</b></td><td>{what}</td></tr>" for key, what in keys)
+        with gui.add_folder("Pose that is drawn", expand_by_default=False):
+            self._scales = [1e3 if joint.slides else 180 / np.pi for joint in cell.joints]
+            self._sliders = [self._joint_slider(gui, k) for k in range(len(cell.joints))]
+            gui.add_button("Back to the robot's pose").on_click(self._back)
+        rows = "".join(f"<tr><td><b>{key}</b></td><td>{what}</td></tr>" for key, what in KEYS)
         gui.add_html(
             block(
                 f"<h3>Keys</h3><table>{rows}</table><p class='soft'>Keys are off while you type in a box.</p>", "keys"
@@ -50,7 +66,7 @@ class ViewPanel:
         )
 
     def refresh(self) -> None:
-        """Show what the colours of the shots mean."""
+        """Show what the colours of the shots mean, and where the robot stands."""
         if self._cell.drawn is None:
             words = "<p class='soft'>Shots are coloured by their residual once there is a solution.</p>"
         else:
@@ -60,16 +76,65 @@ class ViewPanel:
             )
             words = f"<h3>Radial residual of a shot</h3><p>{steps}</p>"
         self._legend.content = block(words, "legend")
+        self._swell.value = int(self._cell.exaggeration)
+        for slider, value, scale in zip(self._sliders, self._cell.commanded, self._scales, strict=True):
+            slider.value = float(np.clip(round(value * scale, 1), slider.min, slider.max))
+
+    def light(self, spot: Spot) -> None:
+        """Draw what a result speaks of in the colour of attention."""
+        if spot.parameter:
+            self._geometry.value = True
+        self._cell.light(spot)
+
+    def _slider(self, gui: "viser.GuiApi", name: str, range_: tuple[float, float, float], at: float, act: Callable):
+        """A slider that acts when a browser moves it, not when the program does."""
+        slider = gui.add_slider(name, *range_, at)
+        self._obey(slider, act, own=False)
+        return slider
+
+    def _joint_slider(self, gui: "viser.GuiApi", k: int) -> "viser.GuiSliderHandle[float]":
+        joint, scale = self._cell.joints[k], self._scales[k]
+        low, high = np.clip(np.array(joint.limits) * scale, -WIDEST, WIDEST).round(1)
+        label = f"q{k + 1} [{'mm' if joint.slides else 'deg'}]"
+        at = float(np.clip(round(self._cell.commanded[k] * scale, 1), low, high))
+        return self._slider(gui, label, (float(low), float(high), 0.1), at, self._pose)
+
+    def _obey(self, handle, act: Callable[[], None], own: bool = True) -> None:
+        """Act when somebody changes a control who may; else it goes back. ``own``: also when the program does."""
+        accepted = [handle.value]
+
+        def changed(event: "viser.GuiEvent") -> None:
+            if event.client is not None and not self._may(event):
+                handle.value = accepted[0]
+                return
+            accepted[0] = handle.value
+            if own or event.client is not None:
+                act()
+
+        handle.on_update(changed)
 
     def _fly(self, event: "viser.GuiEvent") -> None:
         camera = next((c for c in self._cell.cameras() if c.name == self._camera.value), None)
         if camera is not None and event.client is not None:
             fly_to(event.client, camera)
 
-    def _enlarge(self, event: "viser.GuiEvent") -> None:
-        if self._swell.value.isdigit():
-            self._cell.diagnose(bool(self._geometry.value), float(self._swell.value))
+    def _enlarge(self) -> None:
+        self._cell.exaggeration = _within(self._swell)
 
-    def _magnify(self, event: "viser.GuiEvent") -> None:
-        if self._times.value in MAGNIFICATIONS:
-            self._cell.errors.magnification = float(self._times.value)
+    def _magnify(self) -> None:
+        self._cell.errors.magnification = _within(self._times)
+
+    def _pose(self) -> None:
+        self._cell.follow(tuple(_within(s) / scale for s, scale in zip(self._sliders, self._scales, strict=True)))
+
+    def _back(self, event: "viser.GuiEvent") -> None:
+        if self._may(event):
+            self._cell.follow_robot()
+            self.refresh()
+
+
+def _within(slider: "viser.GuiSliderHandle") -> float:
+    """A slider's value; what a browser sends may be anything."""
+    value = slider.value
+    known = isinstance(value, int | float) and np.isfinite(value)
+    return float(np.clip(value, slider.min, slider.max)) if known else float(slider.min)

@@ -75,6 +75,10 @@ class DiagnosisView(SceneGroup):
         with together(self._scene):
             self._draw_dimensions()
 
+    def has(self, frame: int, parameter: str) -> bool:
+        """Whether there is such a dimension."""
+        return (frame, parameter) in self._labels
+
     def overview(self) -> Camera:
         """A view that holds all differences with their labels."""
         corners = [self._models[2][:3, 3], *(p for d in self.dimensions for p in (d.from_m, d.to_m))]

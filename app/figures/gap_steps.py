@@ -1,0 +1,68 @@
+"""The gap as it shrinks: as it is, with each cause added to the sim, and the floor under it."""
+
+import numpy as np
+import plotly.graph_objects as go
+
+from app.figures.sheet import Panel, stacked
+from app.figures.style import BLUE, GREY, SKY, VERMILLION, WIDE_PX, Trace, plain
+from core.gap.place_words import cause_words
+from core.gap.result import GapReport
+from core.gap.verdict_words import length_words
+
+ROW_PX = 34
+LABEL_PX = 7
+"""Of one letter of a label, about."""
+FLOOR_NAMES = {
+    "repeats": "Floor: repeated measurements scatter so",
+    "sigma": "Floor: the instrument's noise",
+    "unknown": "Floor: estimated from the residuals",
+}
+
+
+def gap_steps_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure:
+    """Rms length of real minus sim on kept-out points, one bar a step, from top to bottom."""
+    longest = width_px // 16
+    names = [f"Sim as it is: {report.sim}", *(f"+ {cause_words(cause)}" for cause in report.causes)]
+    steps = [report.gap_rms_m, *(cause.gap_after_rms_m for cause in report.causes)]
+    names = [*_apart([plain(name, longest) for name in names]), plain(FLOOR_NAMES[report.noise.floor_source], longest)]
+    values = np.array([*steps, report.noise.floor_rms_m]) * 1e3
+    colours = [VERMILLION, *([SKY] * (len(steps) - 2)), *([BLUE] if len(steps) > 1 else []), GREY]
+    bars: Trace = {
+        "type": "bar",
+        "orientation": "h",
+        "x": values,
+        "y": names,
+        "marker": {"color": colours},
+        "text": [length_words(value * 1e-3) for value in values],
+        "textposition": "outside",
+        "cliponaxis": False,
+        "showlegend": False,
+        "hovertemplate": "%{y}: %{text}<extra></extra>",
+    }
+    floor: Trace = {
+        "type": "scatter",
+        "x": [values[-1]] * 2,
+        "y": [names[0], names[-1]],
+        "mode": "lines",
+        "line": {"color": GREY, "width": 1.5, "dash": "dot"},
+        "showlegend": False,
+        "hoverinfo": "skip",
+    }
+    top = float(np.nanmax([*values, 1e-9]))
+    y = {"type": "category", "autorange": "reversed", "zeroline": False, "ticks": "", "tickfont_size": 11.5}
+    panel = Panel((bars, floor), y, {"range": [0.0, 1.2 * top], "rangemode": "tozero"})
+    title = "How far the gap shrinks, on points that were kept out of the fit"
+    figure = stacked(title, (panel,), "rms length [mm]", ROW_PX * len(names) + 14, width_px=width_px, legend_rows=0)
+    figure.layout.margin.l = 16 + LABEL_PX * max(len(name) for name in names)
+    figure.layout.bargap = 0.3
+    return figure
+
+
+def _apart(names: list[str]) -> list[str]:
+    """Names that differ, for a scale of categories: what was cut to the same text gets a blank more."""
+    out: list[str] = []
+    for name in names:
+        while name in out:
+            name += "\u2009"
+        out.append(name)
+    return out
