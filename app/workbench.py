@@ -11,12 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.rigs import key_of, rig_for
 from core.calibration import Calibration, calibrate
 from core.calibration_json import calibration_to_json
 from core.geometry import Array
-from core.instruments import Desk, MeasureRequest, Reading
+from core.instruments import Desk, MeasureRequest, Reading, RobotDriver
 from core.kinematics import nominal_net
 from core.live_sweep import LiveSweep, expected_point, live_sweep
+from core.robot import Robot
 from core.session import Session
 from core.session_campaign import to_campaign
 from core.session_events import CheckShot, Failed, Judged, SessionError, ShotTaken, Skipped, Solved, WentTo
@@ -24,7 +26,6 @@ from core.session_plan import PlannedSweep, Step
 from core.session_shots import shot_at
 from core.session_state import Shot, State
 from core.twin.cell import Cell
-from core.twin.instrument import DemoInstrument, DemoRobot
 from core.version import VERSION
 
 TIMEOUT_S = 30.0
@@ -45,23 +46,39 @@ class SweepProgress:
 
 
 class Workbench:
-    """A session at work on the demo cell."""
+    """A session at work in its cell."""
 
-    def __init__(self, session: Session, cell: Cell, seed: int = 1) -> None:
-        self.session, self.cell = session, cell
-        self._seed = seed
-        self._start_cell()
+    def __init__(self, session: Session, cell: Cell | None = None, seed: int = 1) -> None:
+        """``cell`` is a simulated cell that the session may be of, beside the built-in ones."""
+        self.session = session
+        self._cell, self._seed = cell, seed
+        self._set_up()
         self.calibration: Calibration | None = None
         self.previous: Calibration | None = None
         self._listeners: list[Callable[[], None]] = []
         self._one_shot = threading.Lock()
         self._stop = threading.Event()
 
-    def _start_cell(self) -> None:
-        """The demo robot and instrument, going on with fresh noise after the shots that there are."""
-        before = len(self.session.state.shots) + sum(len(check.shots) for check in self.session.state.checks)
-        self.robot = DemoRobot(self.cell, self._seed, visits_before=before)
-        self.desk = Desk(DemoInstrument(self.cell, self.robot, self._seed, shots_before=before))
+    def _set_up(self) -> None:
+        """Robot and instrument as the session has them now."""
+        self._key = key_of(self.state, self._cell)
+        self.rig = rig_for(self.state, self._seed, self._cell)
+        self.desk = Desk(self.rig.meter)
+
+    @property
+    def cell(self) -> Cell | None:
+        """What is simulated; None: the robot is a real one."""
+        return self.rig.cell
+
+    @property
+    def robot(self) -> RobotDriver:
+        """Who moves the robot."""
+        return self.rig.driver
+
+    @property
+    def nominal(self) -> Robot | None:
+        """The robot as designed; None: the session has none."""
+        return self.rig.robot
 
     @property
     def state(self) -> State:
@@ -72,7 +89,9 @@ class Workbench:
         self._listeners.append(listener)
 
     def changed(self) -> None:
-        """Tell all listeners."""
+        """Tell all listeners; robot and instrument are set up anew first if the session says otherwise than before."""
+        if key_of(self.state, self._cell) != self._key:
+            self._set_up()
         for listener in self._listeners:
             listener()
 
@@ -83,13 +102,8 @@ class Workbench:
             SessionError: nothing is left to measure, or the session is read-only.
             InstrumentFailed: robot or instrument did not do it; this is noted in the session too.
         """
-        with self._one_shot:
-            step = self.state.next_step
-            if step is None:
-                raise SessionError("every planned shot is done; solve, or plan more sweeps")
-            shot = self._shoot(step, None, by)
-        self.changed()
-        return shot
+        self._stop.clear()
+        return self._measure(by)
 
     def measure_again(self, number: int, by: str | None = None) -> Shot:
         """Measure the stop of a shot again; the old shot is kept and no longer counts.
@@ -98,6 +112,7 @@ class Workbench:
             SessionError: there is no such shot in the plan.
             InstrumentFailed: as for ``measure``.
         """
+        self._stop.clear()
         with self._one_shot:
             old = self.state.shot(number)
             step = next((s for s in self.state.steps if old is not None and s.key == old.key), None)
@@ -124,7 +139,7 @@ class Workbench:
             step = self.state.next_step
             if step is None or (not whole_plan and first is not None and _sweep_of(step) != _sweep_of(first)):
                 break
-            self.measure(by)
+            self._measure(by)
             taken += 1
             if progress is not None:
                 progress(taken, max(total, taken))
@@ -156,10 +171,10 @@ class Workbench:
         self.changed()
 
     def switch(self, session: Session) -> None:
-        """Work on another session of the same cell; the one at hand is closed."""
+        """Work on another session; the one at hand is closed."""
         with self._one_shot:
             old, self.session = self.session, session
-            self._start_cell()
+            self._set_up()
             self.calibration = self.previous = None
             old.close()
         self.changed()
@@ -291,6 +306,15 @@ class Workbench:
         """
         with self._one_shot:
             shot = self._take(commanded, start, target, shot_of, by)
+        self.changed()
+        return shot
+
+    def _measure(self, by: str | None) -> Shot:
+        with self._one_shot:
+            step = self.state.next_step
+            if step is None:
+                raise SessionError("every planned shot is done; solve, or plan more sweeps")
+            shot = self._shoot(step, None, by)
         self.changed()
         return shot
 

@@ -36,7 +36,7 @@ def shot_of_pose(
     target: str,
     commanded: tuple[float, ...],
     wanted: tuple[float, ...],
-    before: tuple[float, ...],
+    approach: tuple[int, ...],
     reading: Reading,
 ) -> ShotTaken:
     """A shot at a test pose, which no calibration ever fits.
@@ -45,18 +45,23 @@ def shot_of_pose(
         number: of the standstill, the index of the pose in a campaign.
         commanded: what the robot was sent, (n,).
         wanted: what the nominal arm would have been sent, (n,).
-        before: the commands that the robot came from, (n,).
+        approach: sense in which each joint reached its place, (n,).
     """
     return ShotTaken(
         target=target,
         commanded=commanded,
         phase=POSE,
         pose=number,
-        approach=tuple(np.sign(np.subtract(commanded, before)).astype(int).tolist()),
+        approach=approach,
         check=True,
         wanted=None if commanded == wanted else wanted,
         **_seen(reading),
     )
+
+
+def senses(before: tuple[float, ...], after: tuple[float, ...]) -> tuple[int, ...]:
+    """The sense in which each joint goes from one command to another: +1, -1, or 0, (n,)."""
+    return tuple(np.sign(np.subtract(after, before)).astype(int).tolist())
 
 
 def _seen(reading: Reading) -> dict[str, Any]:

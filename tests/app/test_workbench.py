@@ -60,6 +60,11 @@ def test_run_all_then_solve_finds_the_arm(bench):
         bench.measure()
 
 
+def test_after_a_stop_the_first_stop_of_a_sweep_is_measured_as_ever(bench):
+    bench.stop()
+    assert bench.measure().taken.step == 0
+
+
 def test_undo_takes_the_last_shot_back_and_redo_brings_it_again(bench):
     bench.measure()
     first = bench.measure()

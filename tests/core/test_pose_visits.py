@@ -17,7 +17,7 @@ from core.session_campaign import export_campaign, open_campaign, to_campaign
 from core.session_events import PosesPlanned, SessionError
 from core.session_plan import Plan, PlannedSweep
 from core.session_poses import PosePlan, check_pose_plan, new_poses
-from core.session_shots import shot_of_pose
+from core.session_shots import senses, shot_of_pose
 from core.twin import irb_l6
 from core.twin.demo import plan_for
 
@@ -30,7 +30,8 @@ def visit(session: Session, number: int, wanted: tuple[float, ...], shift: float
     commanded = (wanted[0] + shift, *wanted[1:])
     for k, target in enumerate(targets):
         reading = Reading((float(k), 1.0, 2.0))
-        session.append(shot_of_pose(number, target, commanded, wanted, session.state.plan.home, reading))
+        came_from = senses(session.state.plan.home, commanded)
+        session.append(shot_of_pose(number, target, commanded, wanted, came_from, reading))
 
 
 @pytest.fixture
@@ -116,7 +117,7 @@ def test_poses_that_cannot_be_are_refused(plan: PosePlan, sentence: str, session
 
 def test_a_shot_with_wanted_commands_of_another_robot_is_refused(session: Session) -> None:
     wanted = session.state.poses.wanted[0]
-    good = shot_of_pose(0, "T1", wanted, wanted, session.state.plan.home, Reading((0.0, 1.0, 2.0)))
+    good = shot_of_pose(0, "T1", wanted, wanted, (), Reading((0.0, 1.0, 2.0)))
     with pytest.raises(SessionError, match="wanted has 3 values, expected 6"):
         session.append(replace(good, wanted=wanted[:3]))
 
