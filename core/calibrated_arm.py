@@ -11,12 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.arm import Arm
-from core.calibration import Calibration
+from core.calibration import Calibration, calibrated_robot
 from core.driven_robot import DrivenRobot, nominal_driven
 from core.errors import InputError
+from core.estimate import ArmEstimate
 from core.geometry import Array, invert
+from core.measurements import Campaign
 from core.phi_convention import Convention
-from core.phi_model import from_axes
+from core.phi_model import PhiModel, from_axes
 from core.robot import Robot
 
 
@@ -71,19 +73,43 @@ def calibrated_arm(calibration: Calibration) -> CalibratedArm:
     Raises:
         InputError: the geometry is not known, because a joint was not swept.
     """
-    campaign, estimate, refinement = calibration.campaign, calibration.estimate, calibration.refinement
-    if estimate.geometry is None or calibration.convention is None:
+    refinement = calibration.refinement
+    if calibration.estimate.geometry is None or calibration.convention is None or calibration.nominal is None:
         raise InputError("the calibration has no geometry: every joint has to be swept")
-    base, robot = in_robot_base(campaign.robot, calibration.convention, calibration.robot(), estimate.geometry.base)
-    std = np.sqrt(np.diagonal(refinement.rest_covariance_m2, axis1=1, axis2=2))
-    known = np.isfinite(refinement.rest_points_m).all(axis=1)
+    return assembled_arm(
+        calibration.campaign,
+        calibration.convention,
+        calibration.nominal,
+        calibration.estimate,
+        (refinement.rest_points_m, refinement.rest_covariance_m2),
+    )
+
+
+def assembled_arm(
+    campaign: Campaign,
+    convention: Convention,
+    nominal: PhiModel,
+    estimate: ArmEstimate,
+    targets: tuple[Array, Array],
+) -> CalibratedArm:
+    """An estimate of every joint, put together for use.
+
+    Args:
+        convention, nominal: frames of the phi-model and nominal parameters in them.
+        estimate: with its geometry.
+        targets: places at rest in the instrument's frame, (t, 3), NaN where not known, and covariances, (t, 3, 3).
+    """
+    chain = calibrated_robot(campaign.robot, convention, nominal, estimate)
+    base, robot = in_robot_base(campaign.robot, convention, chain, estimate.geometry.base)
+    places, std = targets[0], np.sqrt(np.diagonal(targets[1], axis1=1, axis2=2))
+    known = np.isfinite(places).all(axis=1)
     return CalibratedArm(
         nominal=campaign.robot,
         robot=robot,
         drives=estimate.arm,
         base=base,
         targets=tuple(
-            KnownTarget(target.name, target.link, refinement.rest_points_m[k], std[k])
+            KnownTarget(target.name, target.link, places[k], std[k])
             for k, target in enumerate(campaign.targets)
             if known[k]
         ),

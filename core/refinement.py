@@ -119,7 +119,7 @@ def refine(
         growth = better.rms_m(problem.stated_m2[used]) / noise.rms_m(problem.stated_m2[used])
         settled = abs(growth - 1) < SETTLED and np.allclose(more, excess, rtol=0.05, atol=1e-9)
         noise, excess = better, more
-        worst = _worst_outlier(problem, solved, used) if reject else None
+        worst = worst_outlier(problem, solved, used) if reject else None
         if settled and worst is None:
             break
         if worst is not None:
@@ -184,7 +184,7 @@ def _estimate(
     noise: Noise,
 ) -> ArmEstimate:
     drives, couplings = _function_fits(campaign, problem, state, solved, start, motions)
-    covariance = _axis_covariance(problem, solved.covariance, len(state.axes))
+    covariance = axis_covariance(problem, solved.covariance, len(state.axes))
     geometry = None
     if convention is not None and nominal is not None:
         geometry = geometry_from_axes(state.axes, convention, covariance, nominal)
@@ -235,7 +235,8 @@ def _with_constants(
     return tuple(out)
 
 
-def _axis_covariance(problem: RefinementProblem, covariance: Array, n: int) -> Array:
+def axis_covariance(problem: RefinementProblem, covariance: Array, n: int) -> Array:
+    """Of tilts and shifts of all axes, as ``ArmEstimate`` has it, (4n, 4n); NaN: held."""
     out = np.full((4 * n, 4 * n), np.nan)
     places = [
         (4 * i + k, place.start + k)
@@ -306,7 +307,7 @@ def _used(motion: SweepMotion) -> np.ndarray:
     return used
 
 
-def _worst_outlier(problem: RefinementProblem, solved: Solved, used: np.ndarray) -> int | None:
+def worst_outlier(problem: RefinementProblem, solved: Solved, used: np.ndarray) -> int | None:
     """The row that stands out most, if any does: less than one chance in a thousand that any row would."""
     worst = int(np.argmin(np.where(used, solved.probability, 1.0)))
     stands_out = solved.probability[worst] * used.sum() < 1e-3

@@ -126,7 +126,7 @@ class RefinementProblem:
         rounding = float(np.sum((1e-14 * reach * np.diagonal(whitener, axis1=1, axis2=2)) ** 2))
         for _ in range(50):
             matrix = (whitener @ prediction.jacobian).reshape(-1, self.layout.size)
-            inverse, covariance, lost = _inverses(matrix.T @ matrix)
+            inverse, covariance, lost = inverses(matrix.T @ matrix)
             gradient = matrix.T @ residual
             step = inverse @ gradient
             if gradient @ step <= 1e-6 * cost / freedom + rounding:
@@ -174,7 +174,7 @@ def state_of(start: ArmEstimate, rest_points_m: Array) -> ArmState:
     return ArmState(start.arm.axes, plain, start.arm.couplings, rest_points_m)
 
 
-def _inverses(normal: Array) -> tuple[Array, Array, int]:
+def inverses(normal: Array) -> tuple[Array, Array, int]:
     """Pseudo-inverse of the information matrix for the step, its inverse as covariance, and what is not observable.
 
     A combination of unknowns without information is left alone by the step and gets an enormous variance.
