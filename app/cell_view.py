@@ -1,7 +1,6 @@
 """The cell in 3-D: the arm as it stands, its nominal ghost, instruments, shots and axes, kept up with the workbench."""
 
 import threading
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +11,8 @@ from app.scene.diagnosis import DiagnosisView
 from app.scene.dimensions import fitting_exaggeration
 from app.scene.error_vectors import ErrorVectors
 from app.scene.floor import draw_floor, floor_height, floor_under
+from app.scene.group import Viewer
 from app.scene.points import PointMarks, PointsView, Verdict
-from app.scene.poses import together
 from app.scene.robot import RobotView
 from app.scene.stage import prepare_stage
 from app.scene.stations import Station, StationsView
@@ -23,41 +22,26 @@ from core.calibration import Calibration
 from core.estimate import ArmEstimate
 from core.geometry import Array
 from core.robot import Joint
-from core.twin.instruments import TheodolitePair
-
-if TYPE_CHECKING:
-    import viser
 
 BLUE = (0, 114, 178)
 GHOST_SWELL_M = 0.01
 """The ghost is that much thicker, so that it does not flicker with the arm inside it."""
+SEEN_MOVING_M = 1e-3
+"""A base that is found elsewhere by less than this stays where it is drawn."""
 
 
 class CellView:
     """All nodes of the scene, and how they follow the workbench."""
 
-    def __init__(self, scene: "viser.SceneApi", bench: Workbench) -> None:
-        self._scene, self._bench = scene, bench
-        prepare_stage(scene)
-        base = bench.cell.truth.base
-        nominal = tuple(line.moved(base) for line in bench.cell.robot.axes_at_zero())
-        sliding = bench.cell.robot.sliding
-        couplings = bench.cell.robot.couplings
-        self.arm = RobotView(scene, "/arm", nominal, sliding, couplings=couplings)
-        self.ghost = RobotView(
-            scene, "/nominal", nominal, sliding, GHOST, 0.25, couplings=couplings, swell_m=GHOST_SWELL_M
-        )
-        self.ghost.visible = False
-        self._stations = _stations(bench)
-        positions = np.array([s.position_m for s in self._stations]).reshape(-1, 3)
-        height = floor_height(self.arm.bones, positions)
-        corners = np.concatenate([positions, self.arm.bones.hubs_m])
-        draw_floor(scene, floor_under(corners, height))
-        self.stations = StationsView(scene, self._stations, height)
-        self.points = PointsView(scene)
-        self.errors = ErrorVectors(scene)
+    def __init__(self, viewer: Viewer, bench: Workbench) -> None:
+        self._viewer, self._bench = viewer, bench
+        prepare_stage(viewer.scene)
+        self._stations = tuple(Station(name, place) for name, place in bench.rig.stations)
+        self._base = bench.base().base
+        self._draw_arms()
+        self.points = PointsView(viewer)
+        self.errors = ErrorVectors(viewer)
         self.errors.visible = False
-        self._floor_m = height
         self._axes: AxesView | None = None
         self._diagnosis: DiagnosisView | None = None
         self._diagnosed = False
@@ -75,7 +59,32 @@ class CellView:
     @property
     def joints(self) -> tuple[Joint, ...]:
         """Of the robot that is drawn."""
-        return self._bench.cell.robot.joints
+        return self._bench.nominal.joints
+
+    def _draw_arms(self) -> None:
+        """Draw the nominal arm and its ghost where the base stands, with floor and instrument about them."""
+        robot, viewer = self._bench.nominal, self._viewer
+        nominal = tuple(line.moved(self._base) for line in robot.axes_at_zero())
+        look = {"couplings": robot.couplings}
+        self.arm = RobotView(viewer, "/arm", nominal, robot.sliding, **look)
+        self.ghost = RobotView(viewer, "/nominal", nominal, robot.sliding, GHOST, 0.25, swell_m=GHOST_SWELL_M, **look)
+        self.ghost.visible = False
+        positions = np.array([s.position_m for s in self._stations]).reshape(-1, 3)
+        self._floor_m = floor_height(self.arm.bones, positions)
+        corners = np.concatenate([positions, self.arm.bones.hubs_m])
+        draw_floor(viewer.scene, floor_under(corners, self._floor_m))
+        self.stations = StationsView(viewer, self._stations, self._floor_m)
+
+    def _stand(self) -> None:
+        """Draw the arms anew where the base is found to stand, if that is elsewhere by more than the eye sees."""
+        base = self._bench.base().base
+        if np.abs(base - self._base).max() < SEEN_MOVING_M:
+            return
+        self._base, ghost = base, self.ghost.visible
+        for view in (self.arm, self.ghost, self.stations):
+            view.remove()
+        self._draw_arms()
+        self.ghost.visible = ghost
 
     def cameras(self) -> tuple[Camera, ...]:
         """Where to look from, for the arm as it stands."""
@@ -86,7 +95,7 @@ class CellView:
         with self._moving:
             self.commanded = tuple(commanded)
             net = self._bench.nominal_net(commanded)
-            with together(self._scene):
+            with self._viewer.atomic():
                 for view in (self.arm, self.ghost, self._axes):
                     if view is not None:
                         view.show(net)
@@ -97,6 +106,7 @@ class CellView:
 
     def show_shots(self) -> None:
         """Show every shot of the session, coloured by verdict; the last one marked."""
+        self._stand()
         shots = [s for s in self._bench.state.shots if s.taken.point_m is not None and s.superseded_by is None]
         self.shown_shots = tuple(s.id for s in shots)
         points = np.array([s.taken.point_m for s in shots]).reshape(-1, 3)
@@ -108,7 +118,7 @@ class CellView:
         if expected is None:
             self.points.expect(None)
         else:
-            self.points.expect(*expected)
+            self.points.expect(expected.point_m, expected.axis)
 
     def show_calibration(self, found: Calibration) -> None:
         """Show the fitted axes with their uncertainty, the nominal arm as a ghost, and the residuals."""
@@ -118,7 +128,7 @@ class CellView:
         if geometry is not None and found.nominal is not None:
             self._exaggeration = fitting_exaggeration(found.nominal, geometry, self.arm.bones.reach_m)
         marks = axis_marks(found.estimate)
-        self._axes = AxesView(self._scene, "/axes", marks, self._bench.cell.robot.sliding, length_m=0.7)
+        self._axes = AxesView(self._viewer, "/axes", marks, self._bench.nominal.sliding, length_m=0.7)
         residuals = found.refinement.residuals
         measured = found.campaign.measurements.point_m[residuals.row]
         self.errors.show(measured, measured - residuals.residual_m)
@@ -166,7 +176,7 @@ class CellView:
             way = camera.position_m - camera.look_at_m
             direction = way / np.linalg.norm(way)
             self._diagnosis = DiagnosisView(
-                self._scene, found.nominal, geometry, geometry.base, reach, self._exaggeration, direction
+                self._viewer, found.nominal, geometry, geometry.base, reach, self._exaggeration, direction
             )
         if self._diagnosis is not None:
             self._diagnosis.visible = wanted
@@ -208,13 +218,6 @@ def axis_marks(estimate: ArmEstimate) -> tuple[AxisMark, ...]:
         direction_std, place_std = estimate.axis_std(joint)
         marks.append(AxisMark(joint, line, line.point_m, direction_std, place_std, text=f"axis {joint}"))
     return tuple(marks)
-
-
-def _stations(bench: Workbench) -> tuple[Station, ...]:
-    pair = bench.cell.instrument
-    if not isinstance(pair, TheodolitePair):
-        return (Station("instrument", np.zeros(3)),)
-    return Station("left", np.asarray(pair.left.position_m)), Station("right", np.asarray(pair.right.position_m))
 
 
 def _verdict(word: str) -> Verdict:

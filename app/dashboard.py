@@ -48,7 +48,8 @@ class Dashboard:
         gui = self.server.gui
         gui.configure_theme(**THEME)
         self.seat = Seat(self.server)
-        self.cell = CellView(self.server.scene, bench)
+        self.cell = CellView(self.server, bench)
+        self.cell.points.on_click(self._clicked)
         self._look_at_the_cell()
         gui.main_panel.dock_left()
         gui.main_panel.set_width(390)
@@ -69,7 +70,6 @@ class Dashboard:
         with tabs.add_tab("View"):
             self.view = ViewPanel(gui, self.cell, self._darken, self._may)
         self.results = ResultsPanel(gui, bench, self.ask)
-        self.cell.points.on_click(self._clicked)
         bench.on_change(self.refresh)
         self._hotkeys()
         self.refresh()
@@ -107,12 +107,11 @@ class Dashboard:
             self.check.refresh()
             self.acquire.refresh()
             self.solve.refresh()
-        # Words and shots are on their way before plots, which take longer, are drawn.
-        self.results.refresh()
-        if self.bench.calibration is not None and self.bench.calibration is not self.cell.drawn:
-            with self.server.atomic():
+            # All at once: every batch of messages costs the browser a picture of the scene.
+            self.results.refresh()
+            if self.bench.calibration is not None and self.bench.calibration is not self.cell.drawn:
                 self.cell.show_calibration(self.bench.calibration)
-        self.view.refresh()
+            self.view.refresh()
 
     def stop(self) -> None:
         """Close server, worker and session."""

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.scene.colours import FITTED_AXIS, HIGHLIGHT, NOMINAL_AXIS, Rgb, round_down
-from app.scene.group import SceneGroup, add_solid
-from app.scene.poses import link_motions, pose_of, together
+from app.scene.group import SceneGroup, Viewer, add_solid
+from app.scene.poses import link_motions, pose_of
 from app.scene.solids import Solid, arrow, lathe
 from core.geometry import Array, Line
 
@@ -87,7 +87,7 @@ class AxesView(SceneGroup):
 
     def __init__(
         self,
-        scene: "viser.SceneApi",
+        viewer: Viewer,
         root: str,
         marks: tuple[AxisMark, ...],
         sliding: np.ndarray,
@@ -97,7 +97,7 @@ class AxesView(SceneGroup):
         exaggeration: float = 1.0,
     ) -> None:
         """Draw the axes of joints 1..n, in that order, as they are with all joints at zero."""
-        super().__init__(scene, root)
+        super().__init__(viewer, root)
         self._colour = colour
         self._length, self._radius, self._exaggeration = length_m, radius_m, exaggeration
         self._marks, self._sliding = tuple(marks), np.asarray(sliding, dtype=bool)
@@ -111,14 +111,14 @@ class AxesView(SceneGroup):
     def show(self, net: ArrayLike) -> None:
         """Move the axes to where joints at net displacements (n,) bring them."""
         motions = link_motions(tuple(m.line for m in self._marks), self._sliding, net)
-        with together(self._scene):
+        with self._together():
             for node, mark, motion in zip(self._nodes, self._marks, motions[:-1], strict=True):
                 pose = pose_of(motion, mark.middle_m)
                 node.position, node.wxyz = pose.position_m, pose.wxyz
 
     def highlight(self, joint: int | None) -> None:
         """Draw one axis, 1..n, thick and in the colour of attention, and the others as usual; None: none."""
-        with together(self._scene):
+        with self._together():
             for old in {self._lit, joint} - {None}:
                 lit = old == joint
                 colour, radius = (HIGHLIGHT, 2.0 * self._radius) if lit else (self._colour, self._radius)
@@ -133,7 +133,7 @@ class AxesView(SceneGroup):
     @exaggeration.setter
     def exaggeration(self, factor: float) -> None:
         self._exaggeration = factor
-        with together(self._scene):
+        with self._together():
             self._draw_tubes()
 
     @property
@@ -171,8 +171,8 @@ class AxesView(SceneGroup):
 
 
 def nominal_axes(
-    scene: "viser.SceneApi", root: str, lines: tuple[Line, ...], hubs_m: Array, sliding: np.ndarray, length_m: float
+    viewer: Viewer, root: str, lines: tuple[Line, ...], hubs_m: Array, sliding: np.ndarray, length_m: float
 ) -> AxesView:
     """Nominal axes: thin, grey, without labels and tubes."""
     marks = tuple(AxisMark(k + 1, line, hub) for k, (line, hub) in enumerate(zip(lines, hubs_m, strict=True)))
-    return AxesView(scene, root, marks, sliding, length_m, NOMINAL_AXIS, 0.0025)
+    return AxesView(viewer, root, marks, sliding, length_m, NOMINAL_AXIS, 0.0025)

@@ -9,8 +9,7 @@ from app.scene.cameras import UP, Camera, around, near
 from app.scene.colours import BLUE, FITTED_AXIS, GREY, HIGHLIGHT, NOMINAL_AXIS, VERMILLION, Rgb
 from app.scene.dimensions import Dimension, FrameSketch, dimensions, sketches
 from app.scene.error_vectors import factor_text
-from app.scene.group import SceneGroup, add_solid
-from app.scene.poses import together
+from app.scene.group import SceneGroup, Viewer, add_solid
 from app.scene.solids import Solid, arrow, ball, merged
 from core.estimate import Geometry
 from core.geometry import Array, cross
@@ -28,7 +27,7 @@ class DiagnosisView(SceneGroup):
 
     def __init__(
         self,
-        scene: "viser.SceneApi",
+        viewer: Viewer,
         nominal: PhiModel,
         geometry: Geometry,
         base: Array,
@@ -40,7 +39,7 @@ class DiagnosisView(SceneGroup):
         """Draw all differences.
 
         Args:
-            scene: the server's scene, or a client's.
+            viewer: whose scene it is drawn in.
             nominal: as for ``dimensions``, with ``geometry`` and ``base``.
             geometry: see there.
             base: see there.
@@ -49,7 +48,7 @@ class DiagnosisView(SceneGroup):
             direction: from the arm to the eye, (3,), for which labels are laid out.
             root: name of the node that holds it all.
         """
-        super().__init__(scene, root)
+        super().__init__(viewer, root)
         self.direction = np.asarray(direction, dtype=float)
         self._reach = reach_m
         self._models = (nominal, geometry, base)
@@ -72,7 +71,7 @@ class DiagnosisView(SceneGroup):
     def highlight(self, frame: int | None, parameter: str = "") -> None:
         """Draw one dimension in the colour of attention, with its label; None: none."""
         self._lit = None if frame is None else (frame, parameter)
-        with together(self._scene):
+        with self._together():
             self._draw_dimensions()
 
     def has(self, frame: int, parameter: str) -> bool:
@@ -101,7 +100,7 @@ class DiagnosisView(SceneGroup):
     def _draw(self) -> None:
         drawn = sketches(*self._models, self._exaggeration)
         self.dimensions = tuple(dimensions(*self._models, self._exaggeration, 0.2 * self._reach))
-        with together(self._scene):
+        with self._together():
             self._sketch("nominal", drawn, NOMINAL_AXIS)
             self._sketch("actual", drawn, FITTED_AXIS)
             self._phi_frames(drawn)

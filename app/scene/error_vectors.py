@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.scene.colours import ERROR_VECTOR, Rgb
-from app.scene.group import SceneGroup, add_solid
-from app.scene.poses import together
+from app.scene.group import SceneGroup, Viewer, add_solid
 from app.scene.solids import Solid, arrow, merged
 from core.geometry import Array
 
@@ -43,9 +42,9 @@ class ErrorVectors(SceneGroup):
     """Nodes ``root/arrows`` and ``root/factor``."""
 
     def __init__(
-        self, scene: "viser.SceneApi", root: str = "/errors", magnification: float = 200.0, colour: Rgb = ERROR_VECTOR
+        self, viewer: Viewer, root: str = "/errors", magnification: float = 200.0, colour: Rgb = ERROR_VECTOR
     ) -> None:
-        super().__init__(scene, root)
+        super().__init__(viewer, root)
         self._colour, self._magnification = colour, magnification
         self._measured, self._predicted = np.zeros((0, 3)), np.zeros((0, 3))
         self._label_m = np.zeros(3)
@@ -68,7 +67,7 @@ class ErrorVectors(SceneGroup):
 
     def _draw(self) -> None:
         solid = arrows(magnified_ends(self._measured, self._predicted, self._magnification))
-        with together(self._scene):
+        with self._together():
             if len(solid.faces) == 0:
                 for node in self._drawn:
                     node.remove()

@@ -1,6 +1,7 @@
 """What is drawn under one node, and shown, hidden and removed as one; and solids as meshes without shadows."""
 
-from typing import TYPE_CHECKING, Literal
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from app.scene.colours import Rgb
 from app.scene.solids import Solid
@@ -8,13 +9,16 @@ from app.scene.solids import Solid
 if TYPE_CHECKING:
     import viser
 
+Viewer: TypeAlias = "viser.ViserServer | viser.ClientHandle"
+"""Whose scene is drawn in: that of all browsers, or that of one."""
+
 
 class SceneGroup:
     """A node ``root`` that holds all that its subclass draws."""
 
-    def __init__(self, scene: "viser.SceneApi", root: str) -> None:
-        self._scene, self._root = scene, root
-        self._top = scene.add_frame(root, show_axes=False)
+    def __init__(self, viewer: Viewer, root: str) -> None:
+        self._viewer, self._scene, self._root = viewer, viewer.scene, root
+        self._top = self._scene.add_frame(root, show_axes=False)
 
     @property
     def visible(self) -> bool:
@@ -23,6 +27,10 @@ class SceneGroup:
     @visible.setter
     def visible(self, visible: bool) -> None:
         self._top.visible = visible
+
+    def _together(self) -> AbstractContextManager[None]:
+        """What is sent within reaches the browsers at once, so that no half-moved arm is ever seen."""
+        return self._viewer.atomic()
 
     def remove(self) -> None:
         """Take all of it out of the scene."""

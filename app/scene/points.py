@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.scene.colours import EXCLUDED, HIGHLIGHT, Bytes
-from app.scene.group import SceneGroup, add_solid
-from app.scene.poses import together, turning_to
+from app.scene.group import SceneGroup, Viewer, add_solid
+from app.scene.poses import turning_to
 from app.scene.solids import Solid, ball, merged, octahedron, ring
 from core.geometry import Array
 
@@ -56,6 +56,10 @@ class PointMarks:
         return PointMarks(self.row[chosen], self.point_m[chosen], self.colour[chosen], self.verdict[chosen])
 
 
+def _upright(count: int) -> Array:
+    return np.tile(np.array(UPRIGHT, dtype=np.float32), (count, 1))
+
+
 def cage(radius_m: float) -> Solid:
     """Three thin rings: a hollow ball, for what is left out."""
     thickness = 0.22 * radius_m
@@ -65,8 +69,8 @@ def cage(radius_m: float) -> Solid:
 class PointsView(SceneGroup):
     """Nodes ``root/kept``, ``root/doubtful``, ``root/excluded``, ``root/last``, ``root/next``."""
 
-    def __init__(self, scene: "viser.SceneApi", root: str = "/points", radius_m: float = 0.011) -> None:
-        super().__init__(scene, root)
+    def __init__(self, viewer: Viewer, root: str = "/points", radius_m: float = 0.011) -> None:
+        super().__init__(viewer, root)
         self._radius = radius_m
         self._on_click: OnClick | None = None
         self._solids = {
@@ -75,15 +79,16 @@ class PointsView(SceneGroup):
             Verdict.EXCLUDED: cage(1.15 * radius_m),
         }
         self._batches: dict[Verdict, viser.BatchedMeshHandle] = {}
+        self._rows: dict[Verdict, np.ndarray] = {}
         self._last, self._next = self._halo(), self._ghost()
 
     def on_click(self, callback: OnClick) -> None:
-        """Call back whenever a point is clicked; takes effect with the next ``show``."""
+        """Call back whenever a point is clicked; to be said before the first points are shown."""
         self._on_click = callback
 
     def show(self, marks: PointMarks) -> None:
         """Draw these points instead of those before."""
-        with together(self._scene):
+        with self._together():
             for verdict, solid in self._solids.items():
                 self._batch(verdict, solid, marks.of(verdict))
 
@@ -97,17 +102,28 @@ class PointsView(SceneGroup):
         self._next.wxyz = turning_to(facing)
 
     def _batch(self, verdict: Verdict, solid: Solid, marks: PointMarks) -> None:
-        name, count = f"{self._root}/{verdict.name.lower()}", len(marks.row)
-        if count == 0:
-            old = self._batches.pop(verdict, None)
-            if old is not None:
-                old.remove()
+        """Draw the points of one verdict: those that are there are moved and coloured, not drawn anew."""
+        self._rows[verdict] = marks.row.copy()
+        batch = self._batches.get(verdict)
+        if len(marks.row) == 0:
+            if batch is not None:
+                batch.visible = False
             return
+        if batch is None:
+            self._batches[verdict] = self._first(verdict, solid, marks)
+            return
+        batch.batched_positions = marks.point_m.astype(np.float32)
+        batch.batched_wxyzs = _upright(len(marks.row))
+        if verdict is not Verdict.EXCLUDED:
+            batch.batched_colors = marks.colour
+        batch.visible = True
+
+    def _first(self, verdict: Verdict, solid: Solid, marks: PointMarks) -> "viser.BatchedMeshHandle":
         batch = self._scene.add_batched_meshes_simple(
-            name,
+            f"{self._root}/{verdict.name.lower()}",
             solid.vertices_m,
             solid.faces,
-            batched_wxyzs=np.tile(UPRIGHT, (count, 1)),
+            batched_wxyzs=_upright(len(marks.row)),
             batched_positions=marks.point_m,
             batched_colors=np.array(EXCLUDED) if verdict is Verdict.EXCLUDED else marks.colour,
             lod="off",
@@ -115,20 +131,15 @@ class PointsView(SceneGroup):
             cast_shadow=False,
             receive_shadow=False,
         )
-        self._batches[verdict] = batch
-        self._listen(batch, marks.row.copy())
+        if self._on_click is not None:
+            batch.on_click(lambda event: self._clicked(verdict, event))
+        return batch
 
-    def _listen(self, batch: "viser.BatchedMeshHandle", rows: np.ndarray) -> None:
-        call = self._on_click
-        if call is None:
-            return
-
-        @batch.on_click
-        def _(event: "viser.SceneNodePointerEvent[viser.BatchedMeshHandle]") -> None:
-            index = event.instance_index
-            # What a browser sends is not to be trusted.
-            if isinstance(index, int) and 0 <= index < len(rows):
-                call(int(rows[index]), event.client_id)
+    def _clicked(self, verdict: Verdict, event: "viser.SceneNodePointerEvent[viser.BatchedMeshHandle]") -> None:
+        index, rows = event.instance_index, self._rows[verdict]
+        # What a browser sends is not to be trusted.
+        if self._on_click is not None and isinstance(index, int) and 0 <= index < len(rows):
+            self._on_click(int(rows[index]), event.client_id)
 
     def _halo(self) -> "viser.MeshHandle":
         solid = merged([ring(np.zeros(3), axis, 2.4 * self._radius, 0.4 * self._radius) for axis in np.eye(3)])

@@ -1,17 +1,12 @@
 """Where links stand, as a scene takes it: positions and quaternions (w, x, y, z)."""
 
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from core.geometry import Array, Line, apply, joint_motion
-
-if TYPE_CHECKING:
-    import viser
 
 
 @dataclass(frozen=True)
@@ -57,8 +52,3 @@ def turning_to(direction: ArrayLike) -> Array:
         return np.array([0.0, 1.0, 0.0, 0.0])
     half = np.array([1.0 + z, -y, x, 0.0])
     return half / np.linalg.norm(half)
-
-
-def together(scene: "viser.SceneApi") -> AbstractContextManager[None]:
-    """Everything sent within reaches the browsers at once, so that no half-moved arm is ever seen."""
-    return scene._websock_interface.atomic()

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.scene.colours import ARM, Rgb, shaded
-from app.scene.group import SceneGroup, add_solid
+from app.scene.group import SceneGroup, Viewer, add_solid
 from app.scene.link_shapes import Skeleton, link_shapes, skeleton
 from app.scene.linkage import linkages
-from app.scene.poses import link_motions, pose_of, together
+from app.scene.poses import link_motions, pose_of
 from app.scene.solids import Solid
 from core.geometry import Array, Line
 from core.robot import Coupling
@@ -27,7 +27,7 @@ class RobotView(SceneGroup):
 
     def __init__(
         self,
-        scene: "viser.SceneApi",
+        viewer: Viewer,
         root: str,
         axes: tuple[Line, ...],
         sliding: np.ndarray,
@@ -42,7 +42,7 @@ class RobotView(SceneGroup):
         """Draw an arm with all joints at zero.
 
         Args:
-            scene: the server's scene, or a client's.
+            viewer: whose scene it is drawn in.
             root: name of the node that holds it all, ``/calibrated``.
             axes: joint axes at zero displacement, in the instrument's frame.
             sliding: which joints slide, boolean, (n,).
@@ -53,7 +53,7 @@ class RobotView(SceneGroup):
             tool_m: the tool's point with all joints at zero, (3,).
             swell_m: added to all radii: a ghost must not flicker with the arm that it surrounds.
         """
-        super().__init__(scene, root)
+        super().__init__(viewer, root)
         self.axes, self.sliding = tuple(axes), np.asarray(sliding, dtype=bool)
         self.bones: Skeleton = skeleton(self.axes, self.sliding, floor_m, tool_m)
         self.linkages = linkages(self.bones, couplings)
@@ -74,7 +74,7 @@ class RobotView(SceneGroup):
         """
         motions = link_motions(self.axes, self.sliding, net)
         self.net = np.array(net, dtype=float)
-        with together(self._scene):
+        with self._together():
             for node, motion, origin in zip(self._links, motions, self._origins, strict=True):
                 self._put(node, motion, origin)
             for linkage, crank, rod in zip(self.linkages, self._cranks, self._rods, strict=True):
@@ -89,7 +89,7 @@ class RobotView(SceneGroup):
     @opacity.setter
     def opacity(self, opacity: float | None) -> None:
         self._opacity = opacity
-        with together(self._scene):
+        with self._together():
             for piece in self._pieces:
                 piece.opacity = opacity
 

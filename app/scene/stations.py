@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from app.scene.colours import GREY, INSTRUMENT, SIGHT_LINE, shaded
-from app.scene.group import SceneGroup, add_solid
-from app.scene.poses import together
+from app.scene.group import SceneGroup, Viewer, add_solid
 from app.scene.solids import Solid, barrel, merged, tube
 from core.geometry import Array
 
@@ -65,10 +64,8 @@ def aiming(position_m: ArrayLike, point_m: ArrayLike) -> tuple[Array, Array]:
 class StationsView(SceneGroup):
     """Nodes ``root/0``, ``root/1``.. with ``tripod``, ``head``, ``head/telescope``, ``label``, and ``root/sights``."""
 
-    def __init__(
-        self, scene: "viser.SceneApi", stations: tuple[Station, ...], floor_m: float, root: str = "/stations"
-    ) -> None:
-        super().__init__(scene, root)
+    def __init__(self, viewer: Viewer, stations: tuple[Station, ...], floor_m: float, root: str = "/stations") -> None:
+        super().__init__(viewer, root)
         self._stations = stations
         self._heads = [self._station(k, station, floor_m) for k, station in enumerate(stations)]
         self._sights: viser.LineSegmentsHandle | None = None
@@ -81,7 +78,7 @@ class StationsView(SceneGroup):
             return
         point = np.asarray(point_m, dtype=float)
         lines = np.array([[station.position_m, point] for station in self._stations])
-        with together(self._scene):
+        with self._together():
             for station, (head, scope) in zip(self._stations, self._heads, strict=True):
                 head.wxyz, scope.wxyz = aiming(station.position_m, point)
             if self._sights is None:

@@ -81,9 +81,9 @@ def build(dark: bool) -> Demo:
     stations = (Station("left theodolite", np.zeros(3)), Station("right theodolite", np.array([0.0, 6.0, 0.0])))
     spots = np.array([s.position_m for s in stations])
     height = floor_height(skeleton(lines, sliding), spots)
-    robot = RobotView(scene, "/calibrated", lines, sliding, couplings=couplings, floor_m=height)
+    robot = RobotView(server, "/calibrated", lines, sliding, couplings=couplings, floor_m=height)
     more = {"couplings": couplings, "floor_m": height, "swell_m": 0.01}
-    ghost = RobotView(scene, "/nominal", ideal, sliding, GHOST, 0.25, **more)
+    ghost = RobotView(server, "/nominal", ideal, sliding, GHOST, 0.25, **more)
     bones, length = robot.bones, LENGTH_OF_REACH * robot.bones.reach_m
     draw_floor(scene, floor_under(np.vstack([spots, bones.hubs_m]), height))
     marks = tuple(
@@ -100,14 +100,14 @@ def build(dark: bool) -> Demo:
         calibration=calibration,
         robot=robot,
         ghost=ghost,
-        fitted=AxesView(scene, "/axes/fitted", marks, sliding, length, exaggeration=wide),
-        nominal=nominal_axes(scene, "/axes/nominal", ideal, ghost.bones.hubs_m, sliding, length),
-        stations=StationsView(scene, stations, height),
-        points=PointsView(scene),
-        errors=ErrorVectors(scene, magnification=100.0),
+        fitted=AxesView(server, "/axes/fitted", marks, sliding, length, exaggeration=wide),
+        nominal=nominal_axes(server, "/axes/nominal", ideal, ghost.bones.hubs_m, sliding, length),
+        stations=StationsView(server, stations, height),
+        points=PointsView(server),
+        errors=ErrorVectors(server, magnification=100.0),
         targets=TargetsView(scene, robot, calibration.campaign.targets, refinement.rest_points_m),
         diagnosis=DiagnosisView(
-            scene,
+            server,
             calibration.nominal,
             estimate.geometry,
             estimate.geometry.base,
