@@ -118,7 +118,7 @@ class PoseBench:
         Raises:
             InputError: there is no sweep, or no target on the last link, or too many poses are asked for.
         """
-        state, robot = self.state, self._bench.cell.robot
+        state, robot = self.state, self._bench.nominal
         targets = state.poses.targets or tuple(t.name for t in state.targets if t.link == robot.joint_count)
         seed = 1 + sum(1 for entry in self._bench.session.entries if isinstance(entry.event, PosesPlanned))
         self._bench.session.append(PosesPlanned(new_poses(robot, state.plan, count, seed), targets), by)
@@ -198,7 +198,7 @@ class PoseBench:
             number, approach = standing.number, standing.shots[0].taken.approach
         else:
             # A pose is visited anew by coming from elsewhere.
-            start = tuple(float(v) for v in self._bench.cell.centre) if before == sent else None
+            start = tuple(float(v) for v in self._bench.centre) if before == sent else None
             number, approach = next_number(self.state), senses(start or before, sent)
         for target in visit.targets:
             if self._bench.stopped():
@@ -236,7 +236,7 @@ class PoseBench:
         return PosePlan((*plan.wanted, *more), self._targets())
 
     def _targets(self) -> tuple[str, ...]:
-        n = self._bench.cell.robot.joint_count
+        n = self._bench.nominal.joint_count
         return self.state.poses.targets or tuple(t.name for t in self.state.targets if t.link == n)
 
     def _compensated(self, wanted: tuple[tuple[float, ...], ...]) -> Compensation | None:

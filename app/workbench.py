@@ -12,16 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.rigs import key_of, rig_for
+from core.base_placement import Placement
 from core.calibration import Calibration, calibrate
 from core.calibration_json import calibration_to_json
 from core.geometry import Array
 from core.instruments import Desk, MeasureRequest, Reading, RobotDriver
 from core.kinematics import nominal_net
-from core.live_sweep import LiveSweep, expected_point, live_sweep
+from core.live_sweep import LiveSweep
 from core.robot import Robot
 from core.session import Session
 from core.session_campaign import to_campaign
 from core.session_events import CheckShot, Failed, Judged, SessionError, ShotTaken, Skipped, Solved, WentTo
+from core.session_live import Expected, base_of, base_so_far, expected_place, sweep_so_far
 from core.session_plan import PlannedSweep, Step
 from core.session_shots import shot_at
 from core.session_state import Shot, State
@@ -76,8 +78,8 @@ class Workbench:
         return self.rig.driver
 
     @property
-    def nominal(self) -> Robot | None:
-        """The robot as designed; None: the session has none."""
+    def nominal(self) -> Robot:
+        """The robot as designed."""
         return self.rig.robot
 
     @property
@@ -249,39 +251,30 @@ class Workbench:
 
     def live(self, joint: int, sweep: int) -> tuple[LiveSweep, tuple[Shot, ...]]:
         """The axis of a sweep so far, and the shots that it rests on."""
-        links = self.state.target_links
-        coupled = self.cell.robot.coupling_from(joint) is not None
-        shots = tuple(
-            s
-            for s in self.state.shots
-            if s.counts
-            and s.taken.point_m is not None
-            and _of_sweep(s, joint, sweep)
-            and (links[s.taken.target] == joint or (links[s.taken.target] > joint and not coupled))
-        )
-        points = np.array([s.taken.point_m for s in shots]).reshape(-1, 3)
-        command = np.array([s.taken.commanded[joint - 1] for s in shots])
-        names = [s.taken.target for s in shots]
-        target = np.unique(names, return_inverse=True)[1] if names else None
-        sliding = bool(self.cell.robot.sliding[joint - 1])
-        return live_sweep(points, command, sliding=sliding, target=target, covariance_m2=_covariances(shots)), shots
+        so_far = sweep_so_far(self.state, joint, sweep)
+        return so_far.live, so_far.shots
 
-    def expected(self) -> tuple[Array, Array] | None:
-        """About where the target of the next shot will be, (3,), and the axis it turns about; None: not known yet."""
-        step = self.state.next_step
-        if step is None:
-            return None
-        live, shots = self.live(step.joint, step.sweep)
-        last = next((s for s in reversed(shots) if s.taken.target == step.target), None)
-        if live.fit is None or last is None:
-            return None
-        way = step.commanded[step.joint - 1] - last.taken.commanded[step.joint - 1]
-        return expected_point(live.fit, last.taken.point_m, way), live.fit.line.direction
+    def base(self) -> Placement:
+        """Where the robot's base stands in the instrument's frame, as well as it is known."""
+        if self.rig.base is not None:
+            return Placement(self.rig.base, True)
+        solved = None if self.calibration is None else base_of(self.calibration)
+        return base_so_far(self.state) if solved is None else Placement(solved, True)
+
+    def expected(self) -> Expected | None:
+        """About where the target of the next shot will be; None: not known yet."""
+        step, base = self.state.next_step, self.base()
+        return None if step is None else expected_place(self.state, step, base.base if base.settled else None)
+
+    @property
+    def centre(self) -> Array:
+        """Commands at the arm's marks, or zeros, about which sweeps are made unless they are held elsewhere, (n,)."""
+        home = self.state.plan.home
+        return np.zeros(self.nominal.joint_count) if home is None else np.array(home)
 
     def nominal_net(self, commanded: tuple[float, ...] | Array) -> Array:
         """Net displacements from the marks that the nominal arm believes in, (n,)."""
-        home = np.zeros(len(commanded)) if self.state.plan.home is None else np.array(self.state.plan.home)
-        return nominal_net(self.cell.robot, np.array(commanded) - home)[0]
+        return nominal_net(self.nominal, np.array(commanded) - self.centre)[0]
 
     def take(
         self,
@@ -349,13 +342,6 @@ class Workbench:
             for s in self.state.steps
             if s.key not in closed and (whole_plan or (first is not None and _sweep_of(s) == _sweep_of(first)))
         )
-
-
-def _covariances(shots: tuple[Shot, ...]) -> Array | None:
-    stated = [s.taken.covariance_m2 for s in shots]
-    if not stated or any(c is None for c in stated):
-        return None
-    return np.array(stated)[:, np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])]
 
 
 def _sweep_of(step: Step) -> tuple[int, int]:

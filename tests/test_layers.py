@@ -33,7 +33,7 @@ SESSIONS = """
     core.session_poses
     core.session_events core.suggested_plan
     core.session_entries core.session_import core.session_shots core.session_state
-    core.session_conditions core.entered_shots
+    core.session_conditions core.entered_shots core.session_live
     core.session_lock core.session_store core.session_checks core.session_fold core.session_reader
     core.session_timeline core.session core.session_library core.session_campaign
 """
@@ -53,7 +53,7 @@ APP = """
     app.paths app.progress app.output app.standard_output app.summary
     app.figures app.report_page app.report_cells app.report_words app.report_tables app.captions app.report_html
     app.verification_report
-    app.scene app.workbench app.pose_bench app.jobs app.spots app.clicks app.words app.table_2 app.cell_view app.panels app.dashboard
+    app.scene app.rigs app.workbench app.pose_bench app.jobs app.spots app.clicks app.words app.table_2 app.cell_view app.panels app.dashboard
     app.commands app.__main__
 """
 ORDER = (FOUNDATION + FILES + CALIBRATION + SESSIONS + RESULTS + USE + APP).split()

@@ -40,7 +40,7 @@ class AcquirePanel:
     def refresh(self) -> None:
         """Show where the session stands."""
         state = self._bench.state
-        self._step.content = step_words(state, self._bench.cell.robot)
+        self._step.content = step_words(state, self._bench.nominal)
         rows = self._bench.progress()
         self._table.content = sweeps_table(rows)
         total = sum(r.planned.shots for r in rows)

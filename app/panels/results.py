@@ -52,6 +52,8 @@ class ResultsPanel:
             self._axes = PlotBox(gui, "axes", "Solve to see how well every axis is known.")
         with panel.add_tab("Geometry"):
             self._build_geometry(gui)
+        self.panel = panel
+        """For tabs of others."""
         panel.dock_right()
         panel.set_width(540)
 
@@ -130,7 +132,7 @@ class ResultsPanel:
         joint = last.taken.joint
         live, shots = self._bench.live(joint, last.taken.sweep)
         command = np.array([s.taken.commanded[joint - 1] for s in shots])
-        sliding = bool(self._bench.cell.robot.sliding[joint - 1])
+        sliding = bool(self._bench.nominal.sliding[joint - 1])
         self._live.show(live_figure(live, command, joint, sliding, WIDTH_PX), live.waiting_for)
 
     def _draw_residuals(self) -> None:

@@ -11,6 +11,7 @@ from core.errors import InputError
 from core.session import Session
 from core.session_events import Fact, OperatorNamed, Titled
 from core.session_library import copy_session, free_path, list_sessions
+from core.twin import irb_l6
 from core.twin.demo import demo_events
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class StartPanel:
         rows = "".join(
             f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>"
             for name, value in (
-                ("Robot", self._bench.cell.robot.name),
+                ("Robot", self._bench.nominal.name),
                 ("Instrument", state.instrument.kind),
                 ("Stated noise", f"{(state.instrument.sigma_m or 0) * 1e3:.2g} mm, one coordinate"),
                 ("Operator", state.operator or "not named yet"),
@@ -71,8 +72,8 @@ class StartPanel:
 
         def job(client: object) -> None:
             if asked == "New":
-                path = free_path(folder, self._bench.cell.robot.name)
-                self._bench.switch(Session.create(path, demo_events(self._bench.cell), self._bench.state.operator))
+                path = free_path(folder, self._bench.nominal.name)
+                self._bench.switch(Session.create(path, demo_events(irb_l6.cell()), self._bench.state.operator))
             elif asked == "Copy":
                 copy_session(self._bench.session.path, free_path(folder, self._bench.state.title))
                 self._bench.changed()
