@@ -69,6 +69,9 @@ class Plot:
 
     figure: go.Figure
     caption: str
+    switches: tuple[str, ...] = ()
+    """Boxes beside the figure, each with what it adds: the trace whose ``meta`` has the sum of 2^k over the ticked
+    boxes k as its ``mask`` is shown, and no other that has one."""
 
     @property
     def json(self) -> str:
@@ -116,6 +119,8 @@ class Page:
     sections: tuple[Section, ...]
     figures: tuple[tuple[str, str], ...] = field(default=())
     """Key numbers on top: label and value."""
+    lead: str = ""
+    """The one sentence that stands before everything else."""
 
 
 def page_html(page: Page) -> str:

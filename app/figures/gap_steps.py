@@ -1,5 +1,7 @@
 """The gap as it shrinks: as it is, with each cause added to the sim, and the floor under it."""
 
+from textwrap import wrap
+
 import numpy as np
 import plotly.graph_objects as go
 
@@ -9,7 +11,9 @@ from core.gap.place_words import cause_words
 from core.gap.result import GapReport
 from core.gap.verdict_words import length_words
 
-ROW_PX = 34
+ROW_PX = 36
+LONGEST_LINE = 40
+"""Letters of a label on one line."""
 LABEL_PX = 7
 """Of one letter of a label, about."""
 FLOOR_NAMES = {
@@ -21,10 +25,9 @@ FLOOR_NAMES = {
 
 def gap_steps_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure:
     """Rms length of real minus sim on kept-out points, one bar a step, from top to bottom."""
-    longest = width_px // 16
     names = [f"Sim as it is: {report.sim}", *(f"+ {cause_words(cause)}" for cause in report.causes)]
     steps = [report.gap_rms_m, *(cause.gap_after_rms_m for cause in report.causes)]
-    names = [*_apart([plain(name, longest) for name in names]), plain(FLOOR_NAMES[report.noise.floor_source], longest)]
+    names = _apart([_lines(name) for name in [*names, FLOOR_NAMES[report.noise.floor_source]]])
     values = np.array([*steps, report.noise.floor_rms_m]) * 1e3
     colours = [VERMILLION, *([SKY] * (len(steps) - 2)), *([BLUE] if len(steps) > 1 else []), GREY]
     bars: Trace = {
@@ -53,9 +56,15 @@ def gap_steps_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure:
     panel = Panel((bars, floor), y, {"range": [0.0, 1.2 * top], "rangemode": "tozero"})
     title = "How far the gap shrinks, on points that were kept out of the fit"
     figure = stacked(title, (panel,), "rms length [mm]", ROW_PX * len(names) + 14, width_px=width_px, legend_rows=0)
-    figure.layout.margin.l = 16 + LABEL_PX * max(len(name) for name in names)
+    figure.layout.margin.l = 16 + LABEL_PX * max(len(line) for name in names for line in name.split("<br>"))
     figure.layout.bargap = 0.3
     return figure
+
+
+def _lines(name: str) -> str:
+    """A label on two lines at most, cut if it is longer."""
+    lines = wrap(name, LONGEST_LINE, max_lines=2, placeholder=" …") or [""]
+    return "<br>".join(plain(line, LONGEST_LINE) for line in lines)
 
 
 def _apart(names: list[str]) -> list[str]:

@@ -8,17 +8,20 @@ import numpy as np
 import plotly.graph_objects as go
 
 from app.figures.style import BLUE, GREY, LIGHT, SKY, VERMILLION, WIDE_PX, Trace, thinned
+from core.gap.ledger import difference_with
 from core.gap.place_words import cause_words
 from core.gap.result import GapReport
+from core.gap.verdict_words import length_words
 from core.geometry import Array
 
 MOST_ARROWS, MOST_POINTS = 100, 500
 MOST_SWITCHES = 5
 """Each doubles the number of traces."""
-LENGTH_SHARE = 0.12
-"""Of the size of the cloud of points that the long arrows take."""
+LENGTH_SHARE, HEAD_SHARE = 0.12, 0.014
+"""Of the size of the cloud of points that the long arrows, and the heads of all, take."""
 HEIGHT_PX = 520
-GRID = "rgba(128, 136, 148, 0.35)"
+GRID = "#aab1bb"
+"""To be seen on light and on dark pages."""
 
 
 def switch_names(report: GapReport) -> tuple[str, ...]:
@@ -35,33 +38,27 @@ def gap_vectors_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure 
     drawn = drawn[thinned(len(drawn), np.linalg.norm(report.difference_m[drawn], axis=1), MOST_ARROWS)]
     factor = magnification(sim, report.difference_m[drawn])
     count = len(switch_names(report))
-    traces = [_dots(sim), *(_arrows(report, sim, drawn, mask, count, factor) for mask in range(2**count))]
+    traces = [_dots(sim)]
+    for mask in range(2**count):
+        traces += _arrows(report, sim, drawn, mask, count, factor)
     layout = {
         "template": LIGHT,
         "title": {"text": f"<b>Real minus sim in the worst region, × {factor:g}</b>"},
         "width": width_px,
         "height": HEIGHT_PX,
         "margin": {"l": 0, "r": 0, "t": 32, "b": 0},
-        "showlegend": False,
+        "legend": {"x": 0.01, "y": 0.99, "xref": "paper", "yref": "paper", "yanchor": "top", "font": {"size": 12}},
         "scene": {
             **{f"{axis}axis": _axis(axis) for axis in "xyz"},
             "aspectmode": "data",
-            "camera": {"eye": {"x": 1.3, "y": -1.3, "z": 0.8}},
+            "camera": {"eye": {"x": 1.15, "y": -1.15, "z": 0.7}, "center": {"x": 0, "y": 0, "z": -0.1}},
         },
     }
     return go.Figure(data=traces, layout=layout)
 
 
-def added(report: GapReport, mask: int) -> Array:
-    """Real minus sim once the causes of a mask are added: bit k, cause k; all of them: as fitted together, (m, 3), m."""
-    chosen = [cause for k, cause in enumerate(report.causes) if mask >> k & 1]
-    if chosen and len(chosen) == len(report.causes):
-        return report.left_m
-    return report.difference_m - sum(cause.shift_m for cause in chosen)
-
-
 def magnification(sim_m: Array, difference_m: Array) -> float:
-    """How many times too long arrows are, so that long ones are seen and none fills the figure: 1, 2 or 5 times 10^k."""
+    """How many times too long arrows are, 1, 2 or 5 times 10^k: long ones are seen, and none fills the figure."""
     size = float(np.linalg.norm(np.ptp(sim_m, axis=0)))
     length = float(np.quantile(np.linalg.norm(difference_m, axis=1), 0.95))
     if not (size > 0 and length > 0):
@@ -72,41 +69,62 @@ def magnification(sim_m: Array, difference_m: Array) -> float:
 
 
 def _dots(sim_m: Array) -> Trace:
-    kept = sim_m[thinned(len(sim_m), most=MOST_POINTS)] * 1e3
     return {
         "type": "scatter3d",
-        **dict(zip("xyz", kept.T.round(2), strict=True)),
+        **_coordinates(sim_m[thinned(len(sim_m), most=MOST_POINTS)]),
         "mode": "markers",
         "marker": {"size": 1.6, "color": GREY, "opacity": 0.5},
         "hoverinfo": "skip",
+        "showlegend": False,
     }
 
 
-def _arrows(report: GapReport, sim_m: Array, drawn: np.ndarray, mask: int, count: int, factor: float) -> Trace:
-    """Lines with a dot at the measured end, parted by gaps."""
-    left = added(report, mask)[drawn]
-    ends = np.full((len(drawn), 3, 3), np.nan)
-    ends[:, 0], ends[:, 1] = sim_m[drawn], sim_m[drawn] + factor * left
-    lengths = np.repeat(np.linalg.norm(left, axis=1) * 1e3, 3)
-    records = np.repeat(report.campaign.measurements.record[report.rows[drawn]], 3)
+def _arrows(report: GapReport, sim_m: Array, drawn: np.ndarray, mask: int, count: int, factor: float) -> list[Trace]:
+    """Shafts, parted by gaps, and heads."""
+    left = difference_with(report, mask)[drawn]
+    length = np.linalg.norm(left, axis=1)
+    tips = sim_m[drawn] + factor * left
     colour = VERMILLION if mask == 0 else BLUE if mask == 2**count - 1 else SKY
-    return {
+    shown = {"visible": mask == 0, "meta": {"mask": mask}}
+    records = report.campaign.measurements.record[report.rows[drawn]]
+    words = [f"record {record}: {one * 1e3:.3f} mm" for record, one in zip(records, length, strict=True)]
+    gaps = np.full_like(tips, np.nan)
+    shafts = {
         "type": "scatter3d",
-        **dict(zip("xyz", (ends.reshape(-1, 3) * 1e3).T.round(2), strict=True)),
-        "mode": "lines+markers",
+        **_coordinates(np.stack([sim_m[drawn], tips, gaps], axis=1).reshape(-1, 3)),
+        "mode": "lines",
         "line": {"color": colour, "width": 4},
-        "marker": {"size": np.tile([0.0, 3.5, 0.0], len(drawn)), "color": colour, "line": {"width": 0}},
-        "customdata": np.stack([records, lengths.round(4)], axis=1),
-        "hovertemplate": "record %{customdata[0]}: %{customdata[1]:.3f} mm<extra></extra>",
-        "visible": mask == 0,
-        "meta": {"mask": mask},
+        "name": f"{length_words(float(np.sqrt(np.mean(length**2))))} rms over these {len(drawn)} points",
+        "showlegend": True,
+        "text": np.repeat(words, 3),
+        "hovertemplate": "%{text}<extra></extra>",
     }
+    head = HEAD_SHARE * float(np.linalg.norm(np.ptp(sim_m, axis=0))) * 1e3
+    direction = left / np.maximum(length, 1e-12)[:, None]
+    heads = {
+        "type": "cone",
+        **_coordinates(tips),
+        **dict(zip("uvw", direction.T.round(4), strict=True)),
+        "anchor": "tip",
+        "sizemode": "raw",
+        "sizeref": head,
+        "colorscale": [[0, colour], [1, colour]],
+        "showscale": False,
+        "hoverinfo": "skip",
+    }
+    return [{**shafts, **shown}, {**heads, **shown}]
+
+
+def _coordinates(points_m: Array) -> Trace:
+    return dict(zip("xyz", (points_m * 1e3).T.round(2), strict=True))
 
 
 def _axis(name: str) -> dict:
     return {
         "title": {"text": f"{name} [mm]"},
         "showbackground": False,
+        "showline": True,
+        "linecolor": GRID,
         "gridcolor": GRID,
         "zeroline": False,
         "tickfont": {"size": 10},

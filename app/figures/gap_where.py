@@ -16,13 +16,11 @@ def gap_shares_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure:
     """Shares of the gap: which joints could account for it, and in which directions it lies."""
     where = report.where
     joints = [str(k) for k in range(1, len(where.by_joint) + 1)]
-    panels = [_bars(joints, where.by_joint, "joint", "share that errors at a joint could account for")]
+    panels = [_bars(joints, where.by_joint, "errors of the joint")]
     if where.sweep_directions is not None:
-        panels.append(
-            _bars(["axial", "radial", "tangential"], where.sweep_directions, "sweeps: direction about the joint")
-        )
+        panels.append(_bars(["axial", "radial", "tangential"], where.sweep_directions, "sweeps, about the joint"))
     if where.pose_directions is not None:
-        panels.append(_bars(["x", "y", "z"], where.pose_directions, "poses: direction of the instrument"))
+        panels.append(_bars(["x", "y", "z"], where.pose_directions, "poses, instrument's axes"))
     figure = beside("Where the gap lies", tuple(panels), SHARES_PX, width_px=width_px)
     figure.layout.margin.l = 44
     return figure
@@ -52,7 +50,7 @@ def gap_records_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure:
     return stacked("Point by point", (panel,), "record", RECORDS_PX, width_px=width_px)
 
 
-def _bars(names: list[str], shares: Array, title: str, y_title: str = "") -> Panel:
+def _bars(names: list[str], shares: Array, title: str) -> Panel:
     trace: Trace = {
         "type": "bar",
         "x": names,

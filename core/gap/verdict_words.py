@@ -45,8 +45,11 @@ def length_words(length_m: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share as per cent without decimals; what is not known is said to be so."""
-    return f"{fixed(100 * share, 0)} %" if math.isfinite(share) else "not known"
+    """A share as per cent, with a decimal next to none and all; what is not known is said to be so."""
+    if not math.isfinite(share):
+        return "not known"
+    near = 0 < abs(share) < 0.01 or 0 < abs(1 - share) < 0.01
+    return f"{fixed(100 * share, 1 if near else 0)} %"
 
 
 def cause_sentence(cause: Cause) -> str:
@@ -58,13 +61,6 @@ def cause_sentence(cause: Cause) -> str:
         f"{capital(words)}{apart}: probability {percent(cause.probability)}, {change}; "
         f"{percent(cause.share_closed)} of the gap alone, {percent(cause.share_closed_last)} when added last."
     )
-
-
-def closed_share(report: GapReport) -> float:
-    """Share of gap^2 - floor^2 that all causes together close, on kept-out points; NaN: there is no gap to close."""
-    floor = report.noise.floor_rms_m**2
-    gap = report.gap_rms_m**2 - floor
-    return 1.0 - (report.left_rms_m**2 - floor) / gap if gap > 0 else math.nan
 
 
 def left_sentence(report: GapReport) -> str:
@@ -80,16 +76,11 @@ def left_sentence(report: GapReport) -> str:
 def next_sentence(rivals: Rivals) -> str:
     """What to measure to tell rivals apart, and how well that would do it."""
     if rivals.separation <= 0:
-        return f"{capital(listed_rivals(rivals))}: {rivals.next_measurement}"
+        return f"{capital(either_of(rivals.places))}: {rivals.next_measurement}"
     return (
-        f"{capital(listed_rivals(rivals))}: {rivals.next_measurement} "
+        f"{capital(either_of(rivals.places))}: {rivals.next_measurement.rstrip('. ')} "
         f"(expected to set them {rivals.separation:.1f} standard deviations apart)"
     )
-
-
-def listed_rivals(rivals: Rivals) -> str:
-    """The causes that the data leave open, in words."""
-    return either_of(rivals.places)
 
 
 def capital(text: str) -> str:

@@ -1,0 +1,57 @@
+"""What became of the gap: mean squares that add up, and the points with any choice of causes added to the sim."""
+
+import math
+from dataclasses import dataclass
+
+from core.gap.place_words import cause_words
+from core.gap.result import GapReport
+from core.geometry import Array
+
+FITTED_TOGETHER = "by fitting all of them together"
+BEYOND, FLOOR = "left, beyond the floor", "floor: noise and the arm's own repeatability"
+NEGLIGIBLE = 1e-6
+
+
+@dataclass(frozen=True)
+class LedgerLine:
+    """One part of the mean square of real minus sim, on kept-out points."""
+
+    words: str
+    square_m2: float
+    share: float
+    """Of the whole gap's mean square."""
+
+
+def ledger(report: GapReport) -> tuple[LedgerLine, ...]:
+    """Every cause in the order in which it was added, what is left beyond the floor, and the floor: the sum is the gap.
+
+    Mean squares add up where root mean squares do not. A line may be negative: the cause that it stands for makes
+    kept-out points worse, or less is left than the floor lets expect.
+    """
+    whole, floor = report.gap_rms_m**2, report.noise.floor_rms_m**2
+    parts = [(cause_words(c), c.gap_before_rms_m**2 - c.gap_after_rms_m**2) for c in report.causes]
+    rest = [(BEYOND, report.left_rms_m**2 - floor), (FLOOR, floor)]
+    together = whole - sum(square for _, square in [*parts, *rest])
+    if abs(together) > NEGLIGIBLE * whole:
+        parts.append((FITTED_TOGETHER, together))
+    share = 1.0 / whole if whole > 0 else math.nan
+    return tuple(LedgerLine(words, square, square * share) for words, square in [*parts, *rest])
+
+
+def closed_share(report: GapReport) -> float:
+    """Share of gap^2 - floor^2 that all causes together close, on kept-out points; NaN: there is no gap to close."""
+    floor = report.noise.floor_rms_m**2
+    gap = report.gap_rms_m**2 - floor
+    return 1.0 - (report.left_rms_m**2 - floor) / gap if gap > 0 else math.nan
+
+
+def difference_with(report: GapReport, added: int) -> Array:
+    """Real minus sim once some causes are added to the sim, (m, 3), m.
+
+    Args:
+        added: bit k stands for cause k. With all of them it is what is left after they were fitted together.
+    """
+    chosen = [cause for k, cause in enumerate(report.causes) if added >> k & 1]
+    if chosen and len(chosen) == len(report.causes):
+        return report.left_m
+    return report.difference_m - sum(cause.shift_m for cause in chosen)
