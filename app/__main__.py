@@ -21,9 +21,12 @@ COMMANDS = {
     "serve": "the dashboard in a browser; with no session, a simulated demo cell (this is also what no command means)",
     "calibrate": "calibrate an arm from its single-axis sweeps: JSON, report and tables",
     "simulate": "make a campaign by measuring a simulated arm, with faults if you like",
+    "plan": "which shots tell the most of an arm: sweeps or free poses, with the error to expect of them",
     "axis": "find one joint axis from a plain CSV of points",
     "verify": "errors of the nominal and the calibrated arm over the pose records",
     "compensate": "find the commands that make the calibrated arm take given poses",
+    "gap": "why simulated and real arm differ: where, which effects, how far that shrinks, what to measure next",
+    "blind-check": "diagnose a folder of campaigns blind, then score what was said against answers.json",
     "export": "the calibrated robot for other tools: URDF, MJCF, Denavit-Hartenberg rows, JSON",
 }
 
@@ -79,7 +82,7 @@ def _run(given: list[str]) -> int:
 def _dispatch(given: list[str]) -> int:
     given = _with_command(given)
     chosen = next((word for word in given if not word.startswith("-")), None)
-    command = import_module(f"app.commands.{chosen}") if chosen in COMMANDS else None
+    command = import_module(f"app.commands.{chosen.replace('-', '_')}") if chosen in COMMANDS else None
     parser = _parser(chosen, command)
     try:
         arguments = parser.parse_args(given)

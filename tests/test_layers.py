@@ -52,7 +52,7 @@ USE = """
 APP = """
     app.paths app.progress app.output app.standard_output app.summary
     app.figures app.report_page app.report_cells app.report_words app.report_tables app.captions app.report_html
-    app.verification_report app.gap_tables app.gap_report
+    app.verification_report app.gap_tables app.gap_report app.gap_summary app.blind_report
     app.scene app.rigs app.workbench app.pose_bench app.jobs app.spots app.clicks app.words app.table_2 app.cell_view app.panels app.dashboard
     app.commands app.__main__
 """
