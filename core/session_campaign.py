@@ -18,6 +18,7 @@ from core.session_events import (
     SessionError,
     ShotTaken,
 )
+from core.session_families import with_families
 from core.session_import import OPERATOR, campaign_events
 from core.session_robot import write_texts
 from core.session_state import Shot, State
@@ -33,6 +34,7 @@ def to_campaign(state: State) -> Campaign:
     Raises:
         SessionError: robot, targets or shots are not there yet.
         RobotError: the robot's description cannot be read.
+        InputError: a drive or coupling was given a family that it cannot have.
     """
     robot = state.robot
     if robot is None or not state.targets:
@@ -41,7 +43,7 @@ def to_campaign(state: State) -> Campaign:
     if not shots:
         raise SessionError("no shot counts yet, expected at least one")
     return Campaign(
-        robot=robot,
+        robot=with_families(robot, state.settings),
         targets=state.targets,
         measurements=_measurements(shots, state.targets, robot, state.instrument.sigma_m),
         title=state.title,

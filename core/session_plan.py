@@ -111,6 +111,30 @@ def steps_of(robot: Robot, plan: Plan) -> tuple[Step, ...]:
     return tuple(step for row in plan.sweeps for step in _sweep_steps(robot, row, _still(robot, plan, row)))
 
 
+def extra_step(robot: Robot, plan: Plan, row: PlannedSweep, command: float, number: int, target: str) -> Step:
+    """A shot outside the plan, in the manner of one of its sweeps, reached in the positive sense.
+
+    Args:
+        command: of the swept joint, rad or m.
+        number: of the step, beyond those of the plan.
+
+    Raises:
+        InputError: the command is beyond the joint's limits.
+    """
+    still = _still(robot, plan, row)
+    along = np.zeros(robot.joint_count)
+    along[row.joint - 1] = 1.0
+    held = commands_for(robot, still[None])[0, row.joint - 1]
+    half = (row.high - row.low) / (row.stops - 1) / 2
+    there, before = commands_for(robot, still + np.array([[command - held], [command - held - half]]) * along)
+    limits = np.array([joint.limits for joint in robot.joints])
+    beyond = np.flatnonzero((there < limits[:, 0] - LIMIT_TOLERANCE) | (there > limits[:, 1] + LIMIT_TOLERANCE))
+    if len(beyond):
+        raise InputError(f"the extra stop {_beyond(robot, int(beyond[0]), float(there[beyond[0]]))}")
+    start = tuple(np.clip(before, limits[:, 0], limits[:, 1]).tolist())
+    return Step(row.joint, row.sweep, number, 1, target, tuple(there.tolist()), start)
+
+
 def commands_for(robot: Robot, motors: Array) -> Array:
     """The commands that make a controller move its motors so, (k, n): the inverse of ``active_commands``."""
     commanded = np.array(motors, dtype=float)
@@ -140,12 +164,18 @@ def _check_limits(robot: Robot, plan: Plan) -> None:
         beyond = (commanded < limits[:, 0] - LIMIT_TOLERANCE) | (commanded > limits[:, 1] + LIMIT_TOLERANCE)
         if beyond.any():
             end, joint = np.argwhere(beyond)[0]
-            unit = displacement_units(bool(robot.sliding[joint]))[0]
-            low, high = (from_si(float(limit), unit) for limit in limits[joint])
-            raise InputError(
-                f"the plan's joint {row.joint}, sweep {row.sweep} commands joint {joint + 1} to"
-                f" {from_si(commanded[end, joint], unit):.6g} {unit}, beyond its limits {low:.6g} to {high:.6g} {unit}"
-            )
+            told = _beyond(robot, int(joint), float(commanded[end, joint]))
+            raise InputError(f"the plan's joint {row.joint}, sweep {row.sweep} {told}")
+
+
+def _beyond(robot: Robot, joint: int, command: float) -> str:
+    """That a command is beyond the limits of a joint, 0.., in words."""
+    unit = displacement_units(bool(robot.sliding[joint]))[0]
+    low, high = (from_si(float(limit), unit) for limit in robot.joints[joint].limits)
+    return (
+        f"commands joint {joint + 1} to {from_si(command, unit):.6g} {unit}, beyond its limits {low:.6g} to"
+        f" {high:.6g} {unit}"
+    )
 
 
 def _still(robot: Robot, plan: Plan, row: PlannedSweep) -> Array:

@@ -26,6 +26,7 @@ CALIBRATION = """
     core.estimate core.phi_uncertainty core.arm_jacobian core.coupling
     core.walk_from_base core.joint_by_joint core.refinement_problem core.refined_curves core.refinement
     core.arc_needed core.live_sweep core.base_placement core.findings core.calibration
+    core.solve_figures
 """
 SESSIONS = """
     core.instruments core.by_hand core.point_lines
@@ -33,7 +34,7 @@ SESSIONS = """
     core.session_poses
     core.session_events core.suggested_plan
     core.session_entries core.session_import core.session_shots core.session_state
-    core.session_conditions core.entered_shots core.session_live
+    core.session_conditions core.entered_shots core.session_live core.session_families
     core.session_lock core.session_store core.session_checks core.session_fold core.session_reader
     core.session_timeline core.session core.session_library core.session_campaign
 """

@@ -5,7 +5,7 @@ import pytest
 
 from core.errors import InputError
 from core.kinematics import active_commands
-from core.session_plan import Plan, PlannedSweep, check_plan, commands_for, steps_of
+from core.session_plan import Plan, PlannedSweep, check_plan, commands_for, extra_step, steps_of
 from core.twin import irb_l6, scara
 from core.twin.campaign import both_ways
 from core.twin.demo import plan_for
@@ -103,3 +103,18 @@ def test_a_pass_never_starts_beyond_a_limit() -> None:
     high = robot.joints[5].limits[1] - irb_l6.cell().home[5]
     steps = steps_of(robot, sweep(high=high, both_ways=True))
     assert max(step.start[5] for step in steps if step.start is not None) <= robot.joints[5].limits[1]
+
+
+def test_an_extra_stop_is_made_like_the_sweep_that_it_belongs_to() -> None:
+    cell = irb_l6.cell()
+    plan = plan_for(cell)
+    row = next(row for row in plan.sweeps if row.joint == 4)
+    planned = next(step for step in steps_of(cell.robot, plan) if step.joint == 4 and step.step == 7)
+    extra = extra_step(cell.robot, plan, row, planned.commanded[3], 16, "T2")
+    assert extra.commanded == pytest.approx(planned.commanded, abs=1e-12)
+    assert (extra.step, extra.sense, extra.target) == (16, 1, "T2")
+    assert extra.start[3] < extra.commanded[3]
+    with pytest.raises(
+        InputError, match="the extra stop commands joint 4 to 171.887 deg, beyond its limits -90 to 90 deg"
+    ):
+        extra_step(cell.robot, plan, row, 3.0, 16, "T2")
