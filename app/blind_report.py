@@ -100,18 +100,21 @@ def _score_table(score: Score) -> ShownTable:
 
 
 def _confusion(table: Confusion) -> Section | None:
+    """Columns go by number, so that all of them fit on a sheet."""
     if not table.rows:
         return None
-    headings = (Heading("there"), *(Heading(effect_name(name), numeric=True) for name in table.columns))
+    numbers = {name: str(k) for k, name in enumerate(table.columns, 1)}
+    headings = (Heading("there"), *(Heading(numbers[name], effect_name(name), True) for name in table.columns))
     group = tuple(
         (
-            Cell(effect_name(name), heading=True),
+            Cell(f"{numbers.get(name, '')} {effect_name(name)}".strip(), heading=True),
             *(Cell(str(n) if n else "·", numeric=True, mark="" if n else "muted") for n in row),
         )
         for name, row in zip(table.rows, table.counts, strict=True)
     )
+    legend = ", ".join(f"{number} {effect_name(name)}" for name, number in numbers.items())
     note = "Of one effect the strongest cause; of mixtures the cause that met each effect, by name or by its class."
-    shown = ShownTable("What was there (down), and what it was called (across)", headings, (group,), note, dense=True)
+    shown = ShownTable("What was there, and what it was called", headings, (group,), f"Called: {legend}. {note}", True)
     return Section("confusion", "Confusion table", tables=(shown,))
 
 

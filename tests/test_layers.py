@@ -18,7 +18,7 @@ FILES = """
     core.units core.input_files core.file_records core.toml_text core.toml_records core.text_table
     core.robot_builders core.urdf_masses core.urdf core.robot_files core.robot_writer
     core.measurement_columns core.point_covariance core.measurement_checks core.measurement_table
-    core.measurement_writer core.campaign_files core.campaign_writer core.points_file
+    core.measurement_writer core.campaign_files core.campaign_archive core.campaign_writer core.points_file
 """
 CALIBRATION = """
     core.theodolite core.noise core.axes core.displacement core.sweep_fits
@@ -54,7 +54,8 @@ APP = """
     app.paths app.progress app.output app.standard_output app.summary
     app.figures app.report_page app.report_cells app.report_words app.report_tables app.captions app.report_html
     app.verification_report app.gap_tables app.gap_report app.gap_summary app.blind_report
-    app.scene app.rigs app.workbench app.pose_bench app.jobs app.spots app.clicks app.words app.table_2 app.cell_view app.panels app.dashboard
+    app.scene app.rigs app.workbench app.pose_bench app.jobs app.spots app.clicks app.words app.table_2 app.cell_view
+    app.pose_view app.pose_words app.panels app.verify_tabs app.dashboard
     app.commands app.__main__
 """
 ORDER = (FOUNDATION + FILES + CALIBRATION + SESSIONS + RESULTS + USE + APP).split()

@@ -66,7 +66,7 @@ def cause_sentence(cause: Cause) -> str:
 def left_sentence(report: GapReport) -> str:
     """Whether what is left is noise, and how that was judged."""
     test = report.left_test
-    judged = f" ({test.name}, p = {test.p_value:.2g})" if math.isfinite(test.p_value) else f" ({test.name})"
+    judged = f" ({test.name}, {_chance(test.p_value)})" if math.isfinite(test.p_value) else f" ({test.name})"
     left = length_words(report.left_rms_m)
     if test.left_is_noise:
         return f"What is left, {left}, cannot be told from noise{judged if test.name else ''}."
@@ -88,8 +88,13 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def _chance(p_value: float) -> str:
+    return "p < 0.0001" if p_value < 1e-4 else f"p = {p_value:.2g}"
+
+
 def _causes(report: GapReport) -> str:
-    return capital(listed([cause_words(cause) for cause in report.causes])) or "Nothing"
+    words = [f"{'an ' if c.place.effect == UNKNOWN else ''}{cause_words(c)}" for c in report.causes]
+    return capital(listed(words)) or "Nothing"
 
 
 def _takes(report: GapReport) -> str:
@@ -98,5 +103,5 @@ def _takes(report: GapReport) -> str:
 
 def _located(report: GapReport) -> str:
     """Where an unknown sits, if that is known."""
-    places = [cause_words(c) for c in report.causes if c.place.effect == UNKNOWN]
+    places = [f"an {cause_words(c)}" for c in report.causes if c.place.effect == UNKNOWN]
     return f" ({listed(places)})" if places else ""
