@@ -8,25 +8,32 @@ import hashlib
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from app.rigs import key_of, rig_for
 from core.base_placement import Placement
+from core.by_hand import EnteredPoints
 from core.calibration import Calibration, calibrate
 from core.calibration_json import calibration_to_json
+from core.entered_shots import shots_of_file, shots_of_lines
+from core.errors import InputError
 from core.geometry import Array
-from core.instruments import Desk, MeasureRequest, Reading, RobotDriver
+from core.instruments import Desk, MeasurementCancelled, MeasureRequest, Reading, RobotDriver
 from core.kinematics import nominal_net
 from core.live_sweep import LiveSweep
+from core.point_lines import entered_points
 from core.robot import Robot
 from core.session import Session
 from core.session_campaign import to_campaign
+from core.session_conditions import conditions_of
 from core.session_events import CheckShot, Failed, Judged, SessionError, ShotTaken, Skipped, Solved, WentTo
 from core.session_live import Expected, base_of, base_so_far, expected_place, sweep_so_far
 from core.session_plan import PlannedSweep, Step
 from core.session_shots import shot_at
 from core.session_state import Shot, State
+from core.solve_figures import figures_of
 from core.twin.cell import Cell
 from core.version import VERSION
 
@@ -39,12 +46,22 @@ class SweepProgress:
 
     planned: PlannedSweep
     done: int
+    """Planned shots that were taken, those left out included."""
+    skipped: int
     excluded: int
+    """Shots that do not count, extra ones included."""
+    extra: int
+    """Shots beside the plan."""
     current: bool
 
     @property
+    def left(self) -> int:
+        """Shots still to do."""
+        return max(self.planned.shots - self.done - self.skipped, 0)
+
+    @property
     def finished(self) -> bool:
-        return self.done >= self.planned.shots
+        return self.left == 0
 
 
 class Workbench:
@@ -60,6 +77,10 @@ class Workbench:
         self._listeners: list[Callable[[], None]] = []
         self._one_shot = threading.Lock()
         self._stop = threading.Event()
+        self.running: bool | None = None
+        """While the robot runs: whether it does the whole plan, or this sweep."""
+        self.paused: bool | None = None
+        """The same of a run that was paused; None: none was."""
 
     def _set_up(self) -> None:
         """Robot and instrument as the session has them now."""
@@ -107,6 +128,54 @@ class Workbench:
         self._stop.clear()
         return self._measure(by)
 
+    def measure_extra(self, joint: int, sweep: int, command: float, by: str | None = None) -> tuple[Shot, ...]:
+        """Measure all targets of a sweep at a stop that is not planned.
+
+        Args:
+            command: of the swept joint, rad or m.
+
+        Raises:
+            InputError: there is no such sweep, or the command is beyond the joint's limits.
+            InstrumentFailed: as for ``measure``.
+        """
+        self._stop.clear()
+        with self._one_shot:
+            steps = self.state.extra_steps(joint, sweep, command)
+            shots = tuple(self._shoot(step, None, by) for step in steps)
+        self.changed()
+        return shots
+
+    def enter(self, text: str, unit: str, by: str | None = None) -> int:
+        """Take coordinates that were typed or pasted as the next shots of this sweep, all of them or none.
+
+        Raises:
+            InputError: a line is no point, or there are too many of them.
+            SessionError: the session is read-only.
+        """
+        return self._enter(shots_of_lines(self.state, entered_points(text, unit), conditions_of(self.state)), by)
+
+    def enter_file(self, path: Path, by: str | None = None) -> int:
+        """Take the points of a CSV file as shots of this sweep, all of them or none.
+
+        Raises:
+            InputError: the file cannot be read, or its points do not belong to this sweep.
+            SessionError: the session is read-only.
+        """
+        return self._enter(shots_of_file(self.state, path, conditions_of(self.state)), by)
+
+    def lay_ready(self, text: str, unit: str) -> int:
+        """Lay typed coordinates ready for whatever is measured next by hand; how many there are.
+
+        Raises:
+            InputError: a line is no point, or nobody measures by hand here.
+        """
+        meter = self.rig.meter
+        if not isinstance(meter, EnteredPoints):
+            raise InputError("the points of this cell are simulated, expected no coordinates by hand")
+        points = entered_points(text, unit)
+        meter.enter([Reading(point.point_m) for point in points])
+        return len(points)
+
     def measure_again(self, number: int, by: str | None = None) -> Shot:
         """Measure the stop of a shot again; the old shot is kept and no longer counts.
 
@@ -133,24 +202,48 @@ class Workbench:
         self._stop.clear()
 
     def run(self, whole_plan: bool, by: str | None = None, progress: Callable[[int, int], None] | None = None) -> int:
-        """Let the demo robot do this sweep, or all of them, until done or stopped; the number of shots taken."""
-        self._stop.clear()
+        """Let the robot do this sweep, or all of them, until done, stopped or paused; the number of shots taken.
+
+        Raises:
+            InputError: nothing moves this robot but a person.
+        """
+        if not self.rig.moves_itself:
+            raise InputError("this robot is moved by hand, expected one sweep after the other from you")
+        self.begin_run()
+        self.running, self.paused = whole_plan, None
+        try:
+            return self._run(whole_plan, by, progress)
+        finally:
+            self.running = None
+            self.changed()
+
+    def _run(self, whole_plan: bool, by: str | None, progress: Callable[[int, int], None] | None) -> int:
         first = self.state.next_step
         taken, total = 0, self._left(first, whole_plan)
         while not self._stop.is_set():
             step = self.state.next_step
             if step is None or (not whole_plan and first is not None and _sweep_of(step) != _sweep_of(first)):
                 break
-            self._measure(by)
+            try:
+                self._measure(by)
+            except MeasurementCancelled:
+                break
             taken += 1
             if progress is not None:
                 progress(taken, max(total, taken))
         return taken
 
     def stop(self) -> None:
-        """Stop a run after the shot in progress, and cancel that."""
+        """Stop a run, and cancel the shot in progress."""
+        self.paused = None
         self._stop.set()
         self.desk.cancel()
+
+    def pause(self) -> None:
+        """End a run after the shot in progress; ``paused`` tells what to go on with."""
+        if self.running is not None:
+            self.paused = self.running
+            self._stop.set()
 
     def check_instrument(self, target: str, shots: int, by: str | None = None) -> None:
         """Shoot one target several times while the arm stands still; every shot is on the disk at once."""
@@ -191,10 +284,10 @@ class Workbench:
         self.changed()
 
     def go_to(self, joint: int, sweep: int, by: str | None = None) -> None:
-        """Go on with the first open shot of another sweep."""
-        closed = self.state.done | self.state.skipped.keys()
-        steps = [s for s in self.state.steps if _sweep_of(s) == (joint, sweep)]
-        step = next((s for s in steps if s.key not in closed), None)
+        """Go on with the first open shot of another sweep; one with skipped shots alone opens these again."""
+        done, skipped = self.state.done, self.state.skipped.keys()
+        steps = [s for s in self.state.steps if _sweep_of(s) == (joint, sweep) and s.key not in done]
+        step = next((s for s in steps if s.key not in skipped), next(iter(steps), None))
         if step is None:
             raise SessionError(f"joint {joint}, sweep {sweep} is done; choose a sweep with open shots")
         self.session.append(WentTo(*step.key), by)
@@ -211,7 +304,13 @@ class Workbench:
         self.changed()
 
     def undo(self, by: str | None = None) -> None:
-        """Take back the last decision or shot."""
+        """Take back the last decision or shot, but never what the session began with.
+
+        Raises:
+            SessionError: there is nothing more to take back.
+        """
+        if self.state.undo_next is not None and self.state.undo_next < self.session.began:
+            raise SessionError("this is how the session began; there is nothing more to undo")
         self.session.undo(by)
         self.changed()
 
@@ -230,23 +329,44 @@ class Workbench:
         campaign = to_campaign(state)
         found = calibrate(campaign)
         digest = hashlib.sha256(calibration_to_json(found).encode()).hexdigest()
-        self.session.append(
-            Solved(digest, len(found.refinement.residuals.row), VERSION, {"noise_mm": found.estimate.noise_m * 1e3}), by
-        )
+        self.session.append(Solved(digest, len(found.refinement.residuals.row), VERSION, figures_of(found)), by)
         self.previous, self.calibration = self.calibration, found
         self.changed()
         return found
 
+    def solve_again(self) -> None:
+        """Compute the last solution anew, as after a restart; nothing where shots or choices changed since.
+
+        Raises:
+            TrueaxisError: it cannot be computed any more.
+        """
+        if self.state.solves and self.calibration is None and not self.since_solved:
+            self.calibration = calibrate(to_campaign(self.state))
+            self.changed()
+
+    @property
+    def since_solved(self) -> int:
+        """How many shots and decisions came after the last solution."""
+        return self.session.decisions_since(self.state.solves[-1].id) if self.state.solves else 0
+
     def progress(self) -> tuple[SweepProgress, ...]:
         """All planned sweeps with what is done of them."""
         state = self.state
-        current = state.next_step
+        current, steps = state.next_step, state.steps
         rows = []
         for planned in state.plan.sweeps:
             here = [s for s in state.shots if s.superseded_by is None and _of_sweep(s, planned.joint, planned.sweep)]
-            excluded = sum(1 for s in here if not s.counts)
-            is_current = current is not None and _sweep_of(current) == (planned.joint, planned.sweep)
-            rows.append(SweepProgress(planned, len(here), excluded, is_current))
+            keys = {s.key for s in steps if _sweep_of(s) == (planned.joint, planned.sweep)}
+            rows.append(
+                SweepProgress(
+                    planned=planned,
+                    done=len(keys & state.done),
+                    skipped=len((keys - state.done) & state.skipped.keys()),
+                    excluded=sum(1 for s in here if not s.counts),
+                    extra=sum(1 for s in here if s.key not in keys),
+                    current=current is not None and _sweep_of(current) == (planned.joint, planned.sweep),
+                )
+            )
         return tuple(rows)
 
     def live(self, joint: int, sweep: int) -> tuple[LiveSweep, tuple[Shot, ...]]:
@@ -312,8 +432,10 @@ class Workbench:
         return shot
 
     def _shoot(self, step: Step, replaces: int | None, by: str | None) -> Shot:
+        conditions = conditions_of(self.state)
+
         def shot_of(reading: Reading) -> ShotTaken:
-            return shot_at(step, reading, replaces=replaces)
+            return shot_at(step, conditions.noted(reading), conditions.payload_kg, replaces)
 
         return self._take(step.commanded, step.start, step.target, shot_of, by)
 
@@ -334,6 +456,12 @@ class Workbench:
             self.session.append(Failed(str(wrong) or type(wrong).__name__), by)
             raise
         return self.session.append(shot_of(reading), by).shots[-1]
+
+    def _enter(self, shots: list[ShotTaken], by: str | None) -> int:
+        with self._one_shot:
+            self.session.append_all(shots, by)
+        self.changed()
+        return len(shots)
 
     def _left(self, first: Step | None, whole_plan: bool) -> int:
         closed = self.state.done | self.state.skipped.keys()

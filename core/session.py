@@ -103,6 +103,17 @@ class Session:
         with self._guard:
             return self._timeline.entries
 
+    @property
+    def began(self) -> int:
+        """Number of the first event that is not what the session was made with."""
+        with self._guard:
+            return self._timeline.first_opened
+
+    def decisions_since(self, seq: int) -> int:
+        """How many shots and decisions (undo and redo are such) came after the event of this number."""
+        with self._guard:
+            return self._timeline.decisions_since(seq)
+
     def counts(self, seq: int) -> bool:
         """Whether the event of this number counts now, or was undone."""
         with self._guard:

@@ -202,7 +202,7 @@ class Skipped(OfStep, frozen=True, tag="skipped"):
 
 
 class WentTo(OfStep, frozen=True, tag="went_to"):
-    """The operator goes on from another step of the plan."""
+    """The operator goes on from another step of the plan; if it was skipped, it no longer is."""
 
     undoable = False
 

@@ -129,7 +129,10 @@ def _skipped(state: State, entry: Entry, event: Skipped) -> dict[str, Any]:
 
 
 def _went_to(state: State, entry: Entry, event: WentTo) -> dict[str, Any]:
-    return {"cursor": event.key}
+    if event.key not in state.skipped:
+        return {"cursor": event.key}
+    # Who goes to a skipped step means to make it after all.
+    return {"cursor": event.key, "skipped": _with(state.skipped, event.key, None)}
 
 
 def _check(state: State, entry: Entry, event: CheckShot) -> dict[str, Any]:

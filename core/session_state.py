@@ -15,7 +15,7 @@ from core.errors import InputError
 from core.measurements import SWEEP, Instrument, Target
 from core.robot import Robot
 from core.session_events import CheckShot, NoteWritten, ShotTaken, Solved, Verdict
-from core.session_plan import Plan, Step, StepKey, check_plan, steps_of
+from core.session_plan import Plan, Step, StepKey, check_plan, extra_step, steps_of
 from core.session_poses import PosePlan
 from core.session_robot import robot_of_texts
 
@@ -179,6 +179,22 @@ class State:
     def next_step(self) -> Step | None:
         """The next step to do; None: all done, or nothing planned."""
         return None if self.position is None else self.steps[self.position]
+
+    def extra_steps(self, joint: int, sweep: int, command: float) -> tuple[Step, ...]:
+        """A stop beside the plan of one of its sweeps, one step a target.
+
+        Args:
+            command: of the swept joint, rad or m.
+
+        Raises:
+            InputError: there is no such sweep, or the command is beyond the joint's limits.
+        """
+        row = next((row for row in self.plan.sweeps if (row.joint, row.sweep) == (joint, sweep)), None)
+        if row is None or self.robot is None:
+            raise InputError(f"joint {joint}, sweep {sweep} is not planned, expected a sweep of the plan")
+        taken = [s.taken.step for s in self.shots if (s.taken.joint, s.taken.sweep) == (joint, sweep)]
+        number = max([row.stops - 1, *taken]) + 1
+        return tuple(extra_step(self.robot, self.plan, row, command, number, target) for target in row.targets)
 
     def shot(self, number: int) -> Shot | None:
         """The shot with this id."""

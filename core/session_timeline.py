@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from core.session_entries import Entry
-from core.session_events import Redo, SessionError, Undo
+from core.session_events import Opened, Redo, SessionError, Undo
 from core.session_fold import applied, folded
 from core.session_state import State
 
@@ -40,6 +40,21 @@ class Timeline:
     def last(self) -> int:
         """The largest number so far; 0: nothing yet."""
         return next(reversed(self._entries), 0)
+
+    @property
+    def first_opened(self) -> int:
+        """The number of the first entry by which a program opened the file; one beyond the last: there is none."""
+        opened = (seq for seq, entry in self._entries.items() if isinstance(entry.event, Opened))
+        return next(opened, self.last + 1)
+
+    def decisions_since(self, seq: int) -> int:
+        """How many entries after this one may change a solution: what can be undone, and undo and redo themselves."""
+        count = 0
+        for entry in reversed(self._entries.values()):
+            if entry.seq <= seq:
+                break
+            count += entry.event.undoable or isinstance(entry.event, Undo | Redo)
+        return count
 
     def counts(self, seq: int) -> bool:
         """Whether an entry counts now."""

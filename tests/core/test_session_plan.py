@@ -115,6 +115,6 @@ def test_an_extra_stop_is_made_like_the_sweep_that_it_belongs_to() -> None:
     assert (extra.step, extra.sense, extra.target) == (16, 1, "T2")
     assert extra.start[3] < extra.commanded[3]
     with pytest.raises(
-        InputError, match="the extra stop commands joint 4 to 171.887 deg, beyond its limits -90 to 90 deg"
+        InputError, match=r"the extra stop commands joint 4 to 171.887 deg, beyond its limits -90 to 90 deg"
     ):
         extra_step(cell.robot, plan, row, 3.0, 16, "T2")
