@@ -41,7 +41,6 @@ SESSIONS = """
 RESULTS = """
     core.wording core.report core.json_values core.json_records core.robot_json
     core.axis_json core.motion_json core.calibration_json
-    core.twin
 """
 USE = """
     core.driven_robot core.pose_iteration core.pose_seeds core.inverse_kinematics
@@ -49,6 +48,8 @@ USE = """
     core.rigid_pose core.standstills core.pose_visits core.end_effector
     core.verification core.pose_loop core.repeatability core.verification_json
     core.robot_export core.dh_export core.gap
+    core.rivals
+    core.twin
 """
 APP = """
     app.paths app.progress app.output app.standard_output app.summary
