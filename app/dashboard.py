@@ -112,6 +112,7 @@ class Dashboard:
             if self.bench.calibration is not None and self.bench.calibration is not self.cell.drawn:
                 self.cell.show_calibration(self.bench.calibration)
             self.view.refresh()
+        self.server.flush()
 
     def stop(self) -> None:
         """Close server, worker and session."""

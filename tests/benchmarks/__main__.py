@@ -1,4 +1,4 @@
-"""``python -m tests.benchmarks axes|speed|poses``: a table in Markdown, the same numbers every time but for times."""
+"""``python -m tests.benchmarks axes|speed|poses|dashboard``: a table in Markdown, the same but for times."""
 
 import os
 
@@ -12,7 +12,7 @@ import argparse  # noqa: E402
 def main() -> None:
     """Print the table that was asked for."""
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
-    parser.add_argument("what", choices=("axes", "speed", "poses"))
+    parser.add_argument("what", choices=("axes", "speed", "poses", "dashboard"))
     parser.add_argument("--sweeps", type=int, default=4000, help="simulated sweeps for each row of 'axes'")
     parser.add_argument("--poses", type=int, default=100_000, help="random poses for 'poses'")
     asked = parser.parse_args()
@@ -24,6 +24,10 @@ def main() -> None:
         from tests.benchmarks.compensation_speed import report as of_poses
 
         print(of_poses(asked.poses))
+    elif asked.what == "dashboard":
+        from tests.benchmarks.dashboard import report as of_dashboard
+
+        print(of_dashboard())
     else:
         from tests.benchmarks.axis_speed import report
 
