@@ -26,6 +26,7 @@ from app.panels.start import StartPanel
 from app.panels.view import ViewPanel
 from app.scene.cameras import fly_to
 from app.spots import spot_named
+from app.verify_tabs import VerifyTabs
 from app.words import STYLE
 from app.workbench import Workbench
 from core.errors import InputError
@@ -70,6 +71,7 @@ class Dashboard:
         with tabs.add_tab("View"):
             self.view = ViewPanel(gui, self.cell, self._darken, self._may)
         self.results = ResultsPanel(gui, bench, self.ask)
+        self.verify = VerifyTabs(self.server, bench, tabs, self.results.panel, self.cell, self.ask)
         bench.on_change(self.refresh)
         self._hotkeys()
         self.refresh()
@@ -111,6 +113,7 @@ class Dashboard:
             self.results.refresh()
             if self.bench.calibration is not None and self.bench.calibration is not self.cell.drawn:
                 self.cell.show_calibration(self.bench.calibration)
+            self.verify.refresh()
             self.view.refresh()
         self.server.flush()
 
@@ -125,6 +128,7 @@ class Dashboard:
     def _darken(self, dark: bool) -> None:
         self.server.gui.configure_theme(dark_mode=dark, **THEME)
         self.results.show_dark(dark)
+        self.verify.show_dark(dark)
 
     def _look_at_the_cell(self) -> None:
         """What a browser sees first: the arm, with its instruments behind."""
@@ -133,9 +137,10 @@ class Dashboard:
         first.position, first.look_at, first.up = (tuple(v) for v in (camera.position_m, camera.look_at_m, camera.up))
 
     def _said(self, client: viser.ClientHandle, word: str) -> None:
-        """A finding or a row of table 2 was clicked: show it where it is, and fly there."""
+        """A finding or a row of a table was clicked: show it where it is, and fly there."""
         spot = spot_named(word)
         if spot is None:
+            self.verify.heard(client, word)
             return
         if self.seat.may(client.client_id):
             self.view.light(spot)

@@ -4,7 +4,7 @@ Nothing here draws. Every shot is an event of the session; what follows from the
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from core.errors import InputError, TrueaxisError
 from core.instruments import Reading
 from core.inverse_kinematics import Tolerance
 from core.kinematics import forward, nominal_net
+from core.measurements import POSE
 from core.pose_loop import PoseLoop, pose_loop
 from core.pose_visits import PoseVisit, last_complete, next_number, pose_visits
 from core.session import Session
@@ -109,7 +110,10 @@ class PoseBench:
         for key, value in values.items():
             if not (isinstance(value, int | float) and np.isfinite(value) and 0 <= value <= LARGEST_LIMIT):
                 raise InputError(f"the limit of the {LIMITS[key]} is {value!r}, expected a number from 0 to 10000")
-        self._bench.session.append_all([Setting(key, float(value)) for key, value in values.items()], by)
+        before = self.state.settings
+        changed = [Setting(key, float(v)) for key, v in values.items() if float(v) != before.get(key, 0.0)]
+        if changed:
+            self._bench.session.append_all(changed, by)
         self._bench.changed()
 
     def plan(self, count: int, by: str | None = None) -> None:
@@ -184,9 +188,14 @@ class PoseBench:
 
     def loop(self) -> tuple[PoseLoop | None, str]:
         """What came of the poses by the present solution; without one, a sentence that says why."""
-        key = self._key()
+        left, state = self._unfinished(), self.state
+        # What is still being shot would be judged by too few targets for a moment.
+        if left is not None:
+            state = replace(state, shots=tuple(s for s in state.shots if s.taken.pose != left.number))
+        shots = tuple(s.id for s in state.shots if s.counts and s.taken.phase == POSE)
+        key = id(self._bench.calibration), self._bench.session.path, shots, self.limits, state.targets
         if self._loop is None or self._loop[0] != key:
-            self._loop = key, *self._compared()
+            self._loop = key, *self._compared(state)
         return self._loop[1], self._loop[2]
 
     def _measure(self, visit: NextVisit, by: str | None) -> None:
@@ -203,29 +212,20 @@ class PoseBench:
         for target in visit.targets:
             if self._bench.stopped():
                 return
+            self._standing = self._bench.session, number
             self._bench.take(sent, start, target, _shot_of(visit, number, target, approach), by)
-            self._standing, start = (self._bench.session, number), None
+            start = None
 
-    def _compared(self) -> tuple[PoseLoop | None, str]:
+    def _compared(self, state: State) -> tuple[PoseLoop | None, str]:
         arm = self.arm
         if arm is None:
             return None, "Solve with a sweep of every joint to see the errors."
-        if not pose_visits(self.state):
+        if not pose_visits(state):
             return None, "Measure a pose to see its error."
         try:
-            return pose_loop(verify(to_campaign(self.state), arm, self.limits)), ""
+            return pose_loop(verify(to_campaign(state), arm, self.limits)), ""
         except TrueaxisError as wrong:
             return None, f"{str(wrong)[:1].upper()}{str(wrong)[1:]}."
-
-    def _key(self) -> tuple:
-        state = self.state
-        return (
-            id(self._bench.calibration),
-            self._bench.session.path,
-            tuple(s.id for s in state.shots if s.counts and s.taken.phase == "pose"),
-            self.limits,
-            state.targets,
-        )
 
     def _all_wanted(self, visits: tuple[PoseVisit, ...]) -> PosePlan:
         plan = self.state.poses
@@ -272,15 +272,19 @@ class PoseBench:
             and bool(np.abs(np.subtract(after.commanded, command)).max() > 1e-6),
         )
 
-    def _visit_in_progress(self, commanded: tuple[float, ...]) -> PoseVisit | None:
-        """The visit that the robot still stands in, if not all of it was shot; None: a new one begins."""
+    def _unfinished(self) -> PoseVisit | None:
+        """The visit that the robot stands in, if not all of it was shot."""
         if self._standing is None or self._standing[0] is not self._bench.session:
             return None
-        if self._bench.robot.commanded != commanded:
-            return None
         visit = next((v for v in pose_visits(self.state) if v.number == self._standing[1]), None)
-        complete = visit is not None and frozenset(self._targets()) <= visit.seen
-        return None if visit is None or complete or visit.commanded != commanded else visit
+        if visit is None or frozenset(self._targets()) <= visit.seen:
+            return None
+        return visit if self._bench.robot.commanded == visit.commanded else None
+
+    def _visit_in_progress(self, commanded: tuple[float, ...]) -> PoseVisit | None:
+        """The unfinished visit, if it is of these commands; None: a new one begins."""
+        visit = self._unfinished()
+        return visit if visit is not None and visit.commanded == commanded else None
 
     def _open(self, compensated: bool | None) -> int:
         poses = self.poses()

@@ -6,6 +6,7 @@ end in one measure: the measured pose less the wanted one. No model of the arm i
 the places of the targets on the last link.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +54,30 @@ class PoseLoop:
     def both(self) -> np.ndarray:
         """Wanted poses that were visited in both ways, (b,)."""
         return np.intersect1d(self.nominal.goal, self.compensated.goal)
+
+    @property
+    def improvement_position(self) -> float:
+        """Ratio of mean position errors, nominal to compensated, over poses visited in both ways; NaN without any."""
+        return self._improvement(lambda errors: errors.position.value)
+
+    @property
+    def improvement_orientation(self) -> float:
+        """The same for orientations."""
+        return self._improvement(lambda errors: errors.orientation.value)
+
+    def goal_of(self, wanted: tuple[float, ...]) -> int | None:
+        """Index of the wanted pose that these commands of the nominal arm mean, (n,); None: it was not visited."""
+        if not len(self.wanted):
+            return None
+        away = np.abs(self.wanted - np.array(wanted)).max(axis=1)
+        return int(np.argmin(away)) if away.min() <= 2 * SAME_COMMAND else None
+
+    def _improvement(self, sizes: Callable[[ModelErrors], Array]) -> float:
+        rows = [(self.nominal.last(int(goal)), self.compensated.last(int(goal))) for goal in self.both]
+        before, after = sizes(self.nominal.errors), sizes(self.compensated.errors)
+        pairs = np.array([(before[a], after[b]) for a, b in rows if a is not None and b is not None]).reshape(-1, 2)
+        pairs = pairs[np.isfinite(pairs).all(axis=1)]
+        return float(pairs[:, 0].mean() / pairs[:, 1].mean()) if len(pairs) and pairs[:, 1].any() else np.nan
 
 
 def pose_loop(found: Verification) -> PoseLoop:

@@ -144,6 +144,13 @@ def verdicts(errors: Errors, limit: float | None) -> tuple[str, ...]:
     return tuple("pass" if p else "fail" if f else "undecided" for p, f in zip(passes, fails, strict=True))
 
 
+def pose_verdicts(errors: ModelErrors, limits: Limits) -> tuple[str, ...]:
+    """One verdict a pose, over its position and its orientation; empty without limits."""
+    said = (verdicts(errors.position, limits.position_m), verdicts(errors.orientation, limits.orientation_rad))
+    given = [each for each in said if each]
+    return tuple(overall(pair) for pair in zip(*given, strict=True)) if given else ()
+
+
 def overall(each: tuple[str, ...]) -> str:
     """One verdict out of many: all pass, any fails, or it is not decided."""
     return "fail" if "fail" in each else "undecided" if "undecided" in each else "pass"
@@ -151,10 +158,7 @@ def overall(each: tuple[str, ...]) -> str:
 
 def calibrated_verdict(found: Verification) -> str:
     """Whether the calibrated arm keeps the operator's limits: pass, fail or undecided; empty without limits."""
-    each = (
-        *verdicts(found.calibrated.position, found.limits.position_m),
-        *verdicts(found.calibrated.orientation, found.limits.orientation_rad),
-    )
+    each = pose_verdicts(found.calibrated, found.limits)
     return overall(each) if each else ""
 
 

@@ -25,6 +25,7 @@ KEYS = (
     ("R", "Measure the chosen shot again"),
     ("Backspace", "Undo"),
     ("S", "Solve"),
+    ("V", "Measure the next test pose"),
 )
 
 

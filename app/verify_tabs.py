@@ -1,0 +1,64 @@
+"""What comes after a solution: tabs that appear when there is something for them."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from app.cell_view import CellView
+from app.panels.late_tab import LateTab
+from app.panels.verify import VerifyPanel
+from app.pose_bench import PoseBench
+from app.pose_view import PoseView
+from app.workbench import Workbench
+
+if TYPE_CHECKING:
+    import viser
+
+VERIFY_KEY = "V"
+
+
+class VerifyTabs:
+    """Verify at the left, Poses at the right."""
+
+    def __init__(
+        self,
+        server: "viser.ViserServer",
+        bench: Workbench,
+        left: "viser.GuiTabGroupHandle",
+        right: "viser.PanelHandle",
+        cell: CellView,
+        ask: Callable,
+    ) -> None:
+        gui, self._cell = server.gui, cell
+        self._poses = PoseBench(bench)
+        self.verify = VerifyPanel(bench, self._poses, PoseView(server), ask, self._show_shots)
+        self._tab = LateTab(left, "Verify", lambda: self.verify.build(gui), before="4 Export")
+        self._plots = LateTab(right, "Poses", lambda: self.verify.build_plots(gui))
+        gui.add_command("Measure the next test pose", hotkey=VERIFY_KEY).on_trigger(self._measure)
+
+    def refresh(self) -> None:
+        """Show the tabs that have something to say, and what they say."""
+        there = self._poses.arm is not None or self._poses.loop()[0] is not None
+        there = there or any(pose.nominal_visit or pose.compensated_visit for pose in self._poses.poses())
+        was = self._tab.there
+        self._tab.show(there)
+        self._plots.show(there)
+        if there:
+            self.verify.refresh()
+        elif was:
+            self.verify.forget()
+
+    def show_dark(self, dark: bool) -> None:
+        """Draw for a dark or a light page."""
+        self.verify.show_dark(dark)
+
+    def heard(self, client: "viser.ClientHandle", word: str) -> None:
+        """Something of the page was clicked."""
+        if self._plots.there:
+            self.verify.heard(client, word)
+
+    def _show_shots(self, shown: bool) -> None:
+        self._cell.points.visible = shown
+
+    def _measure(self, event: object) -> None:
+        if self._tab.there:
+            self.verify.measure(event)

@@ -1,0 +1,178 @@
+"""Verifying the demo cell's arm in a real browser: command, measure, compare, before compensation and after it."""
+
+import re
+
+import numpy as np
+import pytest
+from test_dashboard import chromium, group, press, started, tab, visit, wait_for_text  # noqa: F401
+
+from core.pose_visits import pose_visits
+from core.session_store import SUFFIX
+
+PROJECT = """p => { const m = __viserMutable, top = m.nodeRefFromName['/pose_frames'];
+  const v = m.camera.position.clone().set(...p).applyMatrix4(top.matrixWorld).project(m.camera);
+  const r = m.canvas.getBoundingClientRect();
+  return [r.left + (v.x + 1) / 2 * r.width, r.top + (1 - v.y) / 2 * r.height] }"""
+PLACE = "name => { const p = __viserMutable.nodeRefFromName[name].position; return [p.x, p.y, p.z] }"
+NODE = "name => !!__viserMutable.nodeRefFromName[name]"
+TRACES = """() => [...document.querySelectorAll('.js-plotly-plot')].filter(p => p.offsetParent !== null)
+  .map(p => p._fullData.filter(t => t.mode === 'markers').map(t => [t.name, [...t.y].length]))"""
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """A session in which table 1 was measured."""
+    path = tmp_path_factory.mktemp("measured") / f"demo{SUFFIX}"
+    running = started(path)
+    running.bench.run(True)
+    running.stop()
+    return path
+
+
+@pytest.fixture
+def dashboard(measured, tmp_path):
+    path = tmp_path / f"demo{SUFFIX}"
+    path.write_bytes(measured.read_bytes())
+    running = started(path)
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def page(chromium, dashboard):  # noqa: F811
+    one = visit(chromium, dashboard)
+    yield one
+    assert one.problems == []
+    one.close()
+
+
+def solve(page) -> None:
+    tab(page, "3 Solve")
+    press(page, "Solve")
+    page.wait_for_selector("[data-testid=noise]")
+    tab(page, "Verify")
+
+
+def table(page) -> list[list[str]]:
+    """Cells of the table of poses."""
+    rows = page.locator("[data-testid=pose-table] tr").all()
+    return [row.locator("th,td").all_inner_texts() for row in rows]
+
+
+def test_the_tab_comes_with_the_solution_and_the_loop_is_closed(page, dashboard):
+    bench, poses = dashboard.bench, dashboard.verify._poses
+    assert page.get_by_role("tab", name="Verify").count() == 0
+    solve(page)
+    labels = page.get_by_role("tab").all_inner_texts()
+    assert labels.index("Verify") == labels.index("4 Export") - 1
+    wait_for_text(page, "verify-step", "Pose 1 of 12, nominal command")
+    command = page.get_by_test_id("pose-command").inner_text()
+    sent = [float(v) for v in re.findall(r"= (-?[\d.]+)°", command)]
+    np.testing.assert_allclose(np.deg2rad(sent), bench.state.poses.wanted[0], atol=1e-6)
+
+    press(page, "Measure pose")
+    wait_for_text(page, "verify-step", "Pose 2 of 12")
+    assert [v.number for v in pose_visits(bench.state)] == [0]
+    wait_for_text(page, "verify-summary", "nominal")
+    group(page, "Run all poses")
+    wait_for_text(page, "verify-step", "Nothing left to measure")
+    loop, _ = poses.loop()
+    assert (loop.nominal.count, loop.compensated.count) == (12, 12)
+    summary = page.get_by_test_id("verify-summary").inner_text()
+    for attempts in (loop.nominal, loop.compensated):
+        assert f"{attempts.errors.position.mean * 1e3:.2f}"[:4] in summary
+    assert page.get_by_test_id("better").inner_text() == f"{loop.improvement_position:.1f}"
+
+    tab(page, "Poses")
+    page.locator(".js-plotly-plot svg.main-svg").filter(visible=True).first.wait_for()
+    page.wait_for_function(f"() => ({TRACES})().length === 2")
+    assert page.evaluate(TRACES) == [[["nominal command", 12], ["compensated command", 12]]] * 2
+    shown = table(page)
+    assert len(shown) == 13
+    for row, before in zip(shown[1:], loop.nominal.errors.position.value, strict=True):
+        assert float(row[1].split(" ")[0]) == pytest.approx(before * 1e3, abs=0.06)
+
+
+def test_a_pose_is_chosen_by_its_row_and_by_a_click_in_3d(page, dashboard):
+    solve(page)
+    dashboard.verify._poses.run()
+    tab(page, "Poses")
+    wait_for_text(page, "pose-table", "before")
+    page.locator("[data-testid=pose-table] tr").nth(3).click()
+    page.wait_for_function(NODE, arg="/pose_frames/before/wanted")
+    assert dashboard.verify.verify._chosen == 3
+    assert "now" in (page.locator("[data-testid=pose-table] tr").nth(3).get_attribute("class") or "")
+    loop, _ = dashboard.verify._poses.loop()
+    shown = page.evaluate(PLACE, "/pose_frames/after/reached")
+    np.testing.assert_allclose(shown, loop.found.measured.pose[loop.compensated.row[2], :3, 3], atol=1e-5)
+    page.get_by_label("Shots", exact=True).filter(visible=True).click()
+    # The flight has brought pose 3 to the middle of the picture; a click there chooses it anew.
+    dashboard.verify.verify._choose(None, None)
+    page.wait_for_function(f"name => !({NODE})(name)", arg="/pose_frames/before/wanted")
+    page.wait_for_timeout(800)
+    box = page.locator("canvas[data-engine]").bounding_box()
+    x, y = page.evaluate(PROJECT, loop.nominal.errors.predicted[2, :3, 3].tolist())
+    assert box["x"] < x < box["x"] + box["width"]
+    page.mouse.move(x, y)
+    page.wait_for_timeout(300)
+    page.mouse.click(x, y)
+    page.wait_for_function(NODE, arg="/pose_frames/before/wanted")
+    assert dashboard.verify.verify._chosen == 3
+
+
+def test_before_and_after_are_switched_in_3d(page, dashboard):
+    solve(page)
+    dashboard.verify._poses.run()
+    page.wait_for_function(NODE, arg="/pose_errors/after/arrows")
+    assert page.evaluate(NODE, "/pose_errors/before/arrows")
+    for chosen, gone, there in (("after", "before", "after"), ("before", "after", "before")):
+        page.get_by_label("Errors", exact=True).filter(visible=True).click()
+        page.get_by_role("option", name=chosen, exact=True).click()
+        page.wait_for_function(f"name => !({NODE})(name)", arg=f"/pose_errors/{gone}/arrows")
+        page.wait_for_function(NODE, arg=f"/pose_errors/{there}/arrows")
+
+
+def test_limits_give_a_verdict_and_undo_takes_shots_back(page, dashboard):
+    solve(page)
+    dashboard.verify._poses.run()
+    wait_for_text(page, "verify-summary", "Set limits below")
+    box = page.get_by_label("Position [mm]", exact=True)
+    box.fill("5")
+    page.wait_for_timeout(300)
+    press(page, "Keep limits")
+    wait_for_text(page, "pose-verdict", "pass: compensated commands")
+    tab(page, "Poses")
+    wait_for_text(page, "pose-table", "pass")
+    before = len(dashboard.bench.state.shots)
+    group(page, "Undo")
+    page.wait_for_function("() => !document.querySelector('[data-testid=pose-verdict]')")
+    for _ in range(3):
+        dashboard.bench.undo()
+    wait_for_text(page, "verify-step", "Pose 12 of 12, compensated command")
+    assert len(dashboard.bench.state.shots) == before - 3
+
+
+def test_a_watcher_may_not_measure_and_v_measures(chromium, page, dashboard):  # noqa: F811
+    solve(page)
+    watcher = visit(chromium, dashboard)
+    try:
+        tab(watcher, "Verify")
+        press(watcher, "Measure pose")
+        watcher.get_by_role("alert").filter(has_text="Another browser holds").wait_for()
+        assert pose_visits(dashboard.bench.state) == ()
+        page.locator("canvas[data-engine]").click(position={"x": 250, "y": 30})
+        page.keyboard.press("v")
+        wait_for_text(watcher, "verify-step", "Pose 2 of 12")
+    finally:
+        watcher.close()
+
+
+def test_a_new_session_takes_the_tab_away(page, dashboard):
+    solve(page)
+    press(page, "Measure pose")
+    wait_for_text(page, "verify-step", "Pose 2 of 12")
+    tab(page, "1 Cell")
+    group(page, "New")
+    page.get_by_role("tab", name="Verify").wait_for(state="detached")
+    page.get_by_role("tab", name="Poses").wait_for(state="detached")
+    assert dashboard.bench.calibration is None
