@@ -4,6 +4,8 @@ import io
 import lzma
 import zipfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 
@@ -33,11 +35,22 @@ def read_campaign_archive(data: bytes, name: str) -> Campaign:
         CampaignError, RobotError: it is no ZIP file, holds no campaign or more than one, is too large, or the campaign
             cannot be read; one sentence says why.
     """
+    with unpacked_campaign(data, name) as folder:
+        return read_campaign(folder)
+
+
+@contextmanager
+def unpacked_campaign(data: bytes, name: str) -> Iterator[Path]:
+    """The folder of a campaign in a ZIP file, for as long as the context lasts; errors within name the archive.
+
+    Raises:
+        CampaignError: as for ``read_campaign_archive``.
+    """
     with TemporaryDirectory(prefix="trueaxis-") as place:
         folder = Path(place)
         _unpack(data, name, folder)
         try:
-            return read_campaign(folder)
+            yield folder
         except InputError as wrong:
             raise type(wrong)(str(wrong).replace(f"{folder}/", f"{name}: ").replace(str(folder), name)) from None
 

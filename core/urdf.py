@@ -91,6 +91,33 @@ def parse_urdf(source: InputText, base_link: str, tip_link: str) -> UrdfChain:
     )
 
 
+def chain_ends(source: InputText) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Links where a chain may begin (no joint leads to them) and end (none leads on), and then all that lie between.
+
+    Raises:
+        RobotError: the file is not a URDF, or no joint in it moves.
+    """
+    joints = _joints_by_child(_root(source), source)
+    if not any(joint.kind in KINDS for joint in joints.values()):
+        raise RobotError(f"{source.path}: no joint moves, expected a robot")
+    parents = dict.fromkeys(joint.parent for joint in joints.values())
+    starts = tuple(link for link in parents if link not in joints)
+    ends = tuple(link for link in joints if link not in parents)
+    between = tuple(link for link in joints if link in parents)
+    # The deepest end first: that of the arm, not of a gripper's finger or a cable.
+    deepest = sorted(ends, key=lambda link: -_moving_above(joints, link))
+    return (*starts, *between), (*deepest, *between)
+
+
+def _moving_above(joints: dict[str, UrdfJoint], link: str) -> int:
+    """How many joints move between a link and where its chain begins."""
+    count = steps = 0
+    while link in joints and steps <= len(joints):
+        count += joints[link].kind in KINDS and not joints[link].mimics
+        link, steps = joints[link].parent, steps + 1
+    return count
+
+
 def _root(source: InputText) -> ElementTree.Element:
     """The robot element; entities are refused before anything expands them."""
     if "<!DOCTYPE" in source.text or "<!ENTITY" in source.text:

@@ -37,6 +37,7 @@ SESSIONS = """
     core.session_conditions core.entered_shots core.session_live core.session_families
     core.session_lock core.session_store core.session_checks core.session_fold core.session_reader
     core.session_timeline core.session core.session_library core.session_campaign
+    core.session_archive core.import_tray
 """
 RESULTS = """
     core.wording core.report core.json_values core.json_records core.robot_json
