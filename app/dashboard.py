@@ -15,6 +15,7 @@ import viser
 
 from app.cell_view import CellView
 from app.clicks import Ear
+from app.gap_tabs import GapTabs
 from app.jobs import Jobs
 from app.panels.acquire import AcquirePanel
 from app.panels.check import CheckPanel
@@ -72,6 +73,7 @@ class Dashboard:
             self.view = ViewPanel(gui, self.cell, self._darken, self._may)
         self.results = ResultsPanel(gui, bench, self.ask)
         self.verify = VerifyTabs(self.server, bench, tabs, self.results.panel, self.cell, self.ask)
+        self.gap = GapTabs(self.server, bench, tabs, self.results.panel, self.ask)
         bench.on_change(self.refresh)
         self._hotkeys()
         self.refresh()
@@ -114,6 +116,7 @@ class Dashboard:
             if self.bench.calibration is not None and self.bench.calibration is not self.cell.drawn:
                 self.cell.show_calibration(self.bench.calibration)
             self.verify.refresh()
+            self.gap.refresh()
             self.view.refresh()
         self.server.flush()
 
@@ -129,6 +132,7 @@ class Dashboard:
         self.server.gui.configure_theme(dark_mode=dark, **THEME)
         self.results.show_dark(dark)
         self.verify.show_dark(dark)
+        self.gap.show_dark(dark)
 
     def _look_at_the_cell(self) -> None:
         """What a browser sees first: the arm, with its instruments behind."""

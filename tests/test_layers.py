@@ -57,7 +57,8 @@ APP = """
     app.figures app.report_page app.report_cells app.report_words app.report_tables app.captions app.report_html
     app.verification_report app.gap_tables app.gap_report app.gap_summary app.blind_report
     app.scene app.rigs app.workbench app.pose_bench app.jobs app.spots app.clicks app.words app.table_2 app.cell_view
-    app.pose_view app.pose_words app.panels app.verify_tabs app.dashboard
+    app.pose_view app.pose_words app.gap_bench app.gap_words app.gap_view app.panels app.verify_tabs app.gap_tabs
+    app.dashboard
     app.commands app.__main__
 """
 ORDER = (FOUNDATION + FILES + CALIBRATION + SESSIONS + RESULTS + USE + APP).split()

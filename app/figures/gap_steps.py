@@ -12,8 +12,8 @@ from core.gap.result import GapReport
 from core.gap.verdict_words import length_words
 
 ROW_PX = 36
-LONGEST_LINE = 40
-"""Letters of a label on one line."""
+VALUE_PX = 68
+"""Of the value behind a bar."""
 LABEL_PX = 7
 """Of one letter of a label, about."""
 FLOOR_NAMES = {
@@ -27,7 +27,7 @@ def gap_steps_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure:
     """Rms length of real minus sim on kept-out points, one bar a step, from top to bottom."""
     names = [f"Sim as it is: {report.sim}", *(f"+ {cause_words(cause)}" for cause in report.causes)]
     steps = [report.gap_rms_m, *(cause.gap_after_rms_m for cause in report.causes)]
-    names = _apart([_lines(name) for name in [*names, FLOOR_NAMES[report.noise.floor_source]]])
+    names = _apart([_lines(name, width_px // 17) for name in [*names, FLOOR_NAMES[report.noise.floor_source]]])
     values = np.array([*steps, report.noise.floor_rms_m]) * 1e3
     colours = [VERMILLION, *([SKY] * (len(steps) - 2)), *([BLUE] if len(steps) > 1 else []), GREY]
     bars: Trace = {
@@ -51,20 +51,22 @@ def gap_steps_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure:
         "showlegend": False,
         "hoverinfo": "skip",
     }
-    top = float(np.nanmax([*values, 1e-9]))
+    left_px = 16 + LABEL_PX * max(len(line) for name in names for line in name.split("<br>"))
+    bars_px = max(width_px - left_px - 10, 2 * VALUE_PX)
+    top = float(np.nanmax([*values, 1e-9])) * bars_px / (bars_px - VALUE_PX)
     y = {"type": "category", "autorange": "reversed", "zeroline": False, "ticks": "", "tickfont_size": 11.5}
-    panel = Panel((bars, floor), y, {"range": [0.0, 1.2 * top], "rangemode": "tozero"})
+    panel = Panel((bars, floor), y, {"range": [0.0, top], "nticks": 6})
     title = "How far the gap shrinks, on points that were kept out of the fit"
     figure = stacked(title, (panel,), "rms length [mm]", ROW_PX * len(names) + 14, width_px=width_px, legend_rows=0)
-    figure.layout.margin.l = 16 + LABEL_PX * max(len(line) for name in names for line in name.split("<br>"))
+    figure.layout.margin.l = left_px
     figure.layout.bargap = 0.3
     return figure
 
 
-def _lines(name: str) -> str:
-    """A label on two lines at most, cut if it is longer."""
-    lines = wrap(name, LONGEST_LINE, max_lines=2, placeholder=" …") or [""]
-    return "<br>".join(plain(line, LONGEST_LINE) for line in lines)
+def _lines(name: str, longest: int) -> str:
+    """A label on two lines of so many letters at most, cut if it is longer."""
+    lines = wrap(name, longest, max_lines=2, placeholder=" …") or [""]
+    return "<br>".join(plain(line, longest) for line in lines)
 
 
 def _apart(names: list[str]) -> list[str]:

@@ -29,8 +29,14 @@ def switch_names(report: GapReport) -> tuple[str, ...]:
     return tuple(cause_words(cause) for cause in report.causes[:MOST_SWITCHES])
 
 
-def gap_vectors_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure | None:
-    """The worst region, with the other points as dots; None: there is no such region."""
+def gap_vectors_figure(report: GapReport, width_px: int = WIDE_PX, shown: int = 0) -> go.Figure | None:
+    """The worst region, with the other points as dots; None: there is no such region.
+
+    Args:
+        report: the diagnosis.
+        width_px: of the figure.
+        shown: which causes are added to the sim in what is seen first: bit k, cause k.
+    """
     if len(report.where.worst_rows) == 0:
         return None
     sim = report.campaign.measurements.point_m[report.rows] - report.difference_m
@@ -40,7 +46,7 @@ def gap_vectors_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure 
     count = len(switch_names(report))
     traces = [_dots(sim)]
     for mask in range(2**count):
-        traces += _arrows(report, sim, drawn, mask, count, factor)
+        traces += _arrows(report, sim, drawn, mask, count, factor, mask == shown)
     layout = {
         "template": LIGHT,
         "title": {"text": f"<b>Real minus sim in the worst region, × {factor:g}</b>"},
@@ -79,13 +85,15 @@ def _dots(sim_m: Array) -> Trace:
     }
 
 
-def _arrows(report: GapReport, sim_m: Array, drawn: np.ndarray, mask: int, count: int, factor: float) -> list[Trace]:
+def _arrows(
+    report: GapReport, sim_m: Array, drawn: np.ndarray, mask: int, count: int, factor: float, visible: bool
+) -> list[Trace]:
     """Shafts, parted by gaps, and heads."""
     left = difference_with(report, mask)[drawn]
     length = np.linalg.norm(left, axis=1)
     tips = sim_m[drawn] + factor * left
     colour = VERMILLION if mask == 0 else BLUE if mask == 2**count - 1 else SKY
-    shown = {"visible": mask == 0, "meta": {"mask": mask}}
+    shown = {"visible": visible, "meta": {"mask": mask}}
     records = report.campaign.measurements.record[report.rows[drawn]]
     words = [f"record {record}: {one * 1e3:.3f} mm" for record, one in zip(records, length, strict=True)]
     gaps = np.full_like(tips, np.nan)
