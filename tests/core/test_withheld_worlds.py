@@ -9,14 +9,12 @@ from core.campaign_files import read_campaign
 from core.kinematics import link_frames, nominal_net
 from tests.benchmarks.withheld.absorbed import CLUTTER, SIGMA_M, Absorber
 from tests.benchmarks.withheld.arms import ARMS, arm_named
+from tests.benchmarks.withheld.cases import IMPOSSIBLE
 from tests.benchmarks.withheld.chains import Disturbance, seen_points, stand
 from tests.benchmarks.withheld.effects.library import NAMED
 from tests.benchmarks.withheld.loads import nominal_masses, torques
 from tests.benchmarks.withheld.protocols import Plan, rich_session
 from tests.benchmarks.withheld.worlds import make_campaign, needs, shift_m, single_world
-
-CANNOT = {("scara", "zero_offset"), ("scara", "linkage"), ("seven", "scale")}
-"""Effects of which nothing is left on an arm once placement and clutter took their part, or that it cannot have."""
 
 
 @pytest.mark.parametrize("key", ARMS)
@@ -42,12 +40,13 @@ def test_nothing_wrong_leaves_noise_and_clutter_alone(key: str, tmp_path: Path) 
 @pytest.mark.parametrize("name", NAMED)
 @pytest.mark.parametrize("key", ARMS)
 def test_every_effect_is_as_strong_as_asked_and_written_as_a_campaign(key: str, name: str, tmp_path: Path) -> None:
-    if (key, name) in CANNOT:
+    if (key, name) in IMPOSSIBLE:
         with pytest.raises(ValueError, match=key):
             make_campaign(key, name, 3.0, 3, tmp_path)
         return
     world = make_campaign(key, name, 3.0, 3, tmp_path)
-    assert world.visible[0] == pytest.approx(3.0, rel=0.02)
+    # Rounding jumps as its step grows, so that no step may come nearer than some per cent.
+    assert world.visible[0] == pytest.approx(3.0, rel=0.05 if name == "quantisation" else 0.015)
     assert world.answers[0]["effect"] == name
     campaign = read_campaign(tmp_path)
     assert 650 <= campaign.measurements.seen.sum() <= 1150

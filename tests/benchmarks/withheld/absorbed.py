@@ -51,10 +51,17 @@ class Absorber:
 
     def left(self, shift_m: Array) -> float:
         """Rms a coordinate, in standard deviations, of shifts (k, 3) after the best absorption."""
-        y = (shift_m / SIGMA_M).ravel()
-        b = self.columns.T @ y
-        square = y @ y - b @ cho_solve(self._factor, b)
-        return float(np.sqrt(max(square, 0.0) / len(y)))
+        return float(np.sqrt(max(self._product(shift_m, shift_m), 0.0) / shift_m.size))
+
+    def alike(self, a: Array, b: Array) -> float:
+        """Cosine between what is left of two shifts: 1 where one can stand for the other."""
+        both = self._product(a, a) * self._product(b, b)
+        return float(self._product(a, b) / np.sqrt(both)) if both > 0 else 0.0
+
+    def _product(self, a: Array, b: Array) -> float:
+        """Inner product, in standard deviations, of what is left of two shifts (k, 3)."""
+        y, z = a.ravel() / SIGMA_M, b.ravel() / SIGMA_M
+        return float(y @ z - (self.columns.T @ y) @ cho_solve(self._factor, self.columns.T @ z))
 
 
 def raw(shift_m: Array) -> float:

@@ -32,6 +32,8 @@ class Plan:
     """Whether each joint is also measured while it moves."""
     crowded: int = 10
     """Poses in a row between sweeps."""
+    held: tuple[int, ...] = ()
+    """Joints that never move, from 0; not the first."""
 
 
 def random_plan(rng: np.random.Generator, in_motion: bool = False, targets: int | None = None) -> Plan:
@@ -49,7 +51,8 @@ def rich_session(arm: Arm, rng: np.random.Generator, plan: Plan | None = None) -
     """A session by a plan; everything else is chance."""
     plan = plan or random_plan(rng)
     homes = arm.homes + rng.uniform(-0.12, 0.12, arm.homes.shape) * arm.reach
-    first = _sweep_job(arm, rng, homes[0], 0, 1, plan)
+    homes[1, list(plan.held)] = homes[0, list(plan.held)]
+    first = sweep_job(arm, rng, homes[0], 0, 1, plan)
     unloaded, loaded = _jobs(arm, rng, homes, plan)
     blocks = [*_blocks(rng, unloaded, 3), *_blocks(rng, loaded, 2)]
     diary = Diary(arm, rng)
@@ -61,24 +64,26 @@ def rich_session(arm: Arm, rng: np.random.Generator, plan: Plan | None = None) -
             diary.payload = load * arm.payload_kg
         for job in blocks[k]:
             job(diary)
-    _sweep_job(arm, rng, homes[0], 0, 2, plan)(diary)
+    sweep_job(arm, rng, homes[0], 0, 2, plan)(diary)
     return diary.session(random_places(rng, plan.targets), random_base(rng))
 
 
 def _jobs(arm: Arm, rng: np.random.Generator, homes: Array, plan: Plan) -> tuple[list[Job], list[Job]]:
     """What is measured without and with the load."""
-    unloaded = [_sweep_job(arm, rng, homes[0], j, 1, plan) for j in range(1, arm.count)]
-    loaded = [_sweep_job(arm, rng, homes[1], j, 3, plan) for j in range(arm.count)]
+    free = [j for j in range(arm.count) if j not in plan.held]
+    unloaded = [sweep_job(arm, rng, homes[0], j, 1, plan) for j in free[1:]]
+    loaded = [sweep_job(arm, rng, homes[1], j, 3, plan) for j in free]
     if plan.in_motion:
-        unloaded += [_moving_job(arm, rng, homes[0], j, 4, plan) for j in range(arm.count)]
-    places = _spread(arm, rng, homes, plan.poses)
+        unloaded += [_moving_job(arm, rng, homes[0], j, 4, plan) for j in free]
+    places = spread_poses(arm, rng, homes, plan.poses)
+    places[:, list(plan.held)] = homes[0, list(plan.held)]
     carried = rng.random(plan.poses) < 0.5
     visits = np.concatenate([np.arange(plan.poses), np.repeat(np.arange(plan.repeated), plan.visits - 1)])
     visits = rng.permutation(visits)
     for with_load, jobs in ((False, unloaded), (True, loaded)):
         mine = [(int(k), int(which)) for k, which in enumerate(visits) if carried[which] == with_load]
         for start in range(0, len(mine), plan.crowded):
-            jobs.append(_pose_job(arm, rng, places, mine[start : start + plan.crowded], plan))
+            jobs.append(pose_job(arm, rng, places, mine[start : start + plan.crowded], plan))
     return unloaded, loaded
 
 
@@ -87,7 +92,7 @@ def _blocks(rng: np.random.Generator, jobs: list[Job], count: int) -> list[list[
     return [[jobs[k] for k in part] for part in np.array_split(order, count)]
 
 
-def _spread(arm: Arm, rng: np.random.Generator, homes: Array, count: int) -> Array:
+def spread_poses(arm: Arm, rng: np.random.Generator, homes: Array, count: int) -> Array:
     """Poses about the two configurations, (count, n)."""
     middle = homes.mean(axis=0)
     wide = np.maximum(0.85 * arm.reach, 0.5 * np.abs(homes[1] - homes[0]))
@@ -100,7 +105,7 @@ def _inside(arm: Arm, q: Array) -> Array:
     return np.clip(q, low + margin, high - margin)
 
 
-def _sweep_job(arm: Arm, rng: np.random.Generator, home: Array, joint: int, number: int, plan: Plan) -> Job:
+def sweep_job(arm: Arm, rng: np.random.Generator, home: Array, joint: int, number: int, plan: Plan) -> Job:
     """One joint there and back over the same uneven steps, past both ends so that senses are sure."""
     count = max(8, plan.sweep_points // (2 * (2 * arm.count + 1)))
     values = _uneven(rng, *_span(arm, home, joint), count)
@@ -142,12 +147,13 @@ def _moving_job(arm: Arm, rng: np.random.Generator, home: Array, joint: int, num
     return measure
 
 
-def _pose_job(arm: Arm, rng: np.random.Generator, places: Array, visits: list[tuple[int, int]], plan: Plan) -> Job:
+def pose_job(arm: Arm, rng: np.random.Generator, places: Array, visits: list[tuple[int, int]], plan: Plan) -> Job:
     """Poses one after the other, each reached from a place at a known distance, all targets measured."""
 
     def measure(diary: Diary) -> None:
         for pose, which in visits:
             away = np.exp(rng.uniform(np.log(0.02), np.log(0.8), arm.count)) * arm.reach
+            away[list(plan.held)] = 0.0
             diary.move(_inside(arm, places[which] + away * rng.choice([-1.0, 1.0], arm.count)))
             diary.point(places[which], "pose", list(range(plan.targets)), pose=pose)
 

@@ -96,7 +96,7 @@ class Mesh(JointEffect):
         return Disturbance(turn=only_joint(session, self.joint, 1e-3 * size * wave))
 
     def answer(self, session: Session) -> dict[str, object]:
-        return {"effect": "mesh", **self.place, "times": self.times}
+        return {"effect": "mesh", **self.place}
 
 
 @dataclass(frozen=True)
