@@ -88,7 +88,16 @@ class CellView:
 
     def cameras(self) -> tuple[Camera, ...]:
         """Where to look from, for the arm as it stands."""
-        return presets(self.arm.bones, self.arm.net, self._stations, self._floor_m)
+        return presets(self.arm.bones, self.arm.net, self._stations, self._floor_m, self._extremes())
+
+    def _extremes(self) -> tuple[Array, ...]:
+        """Net displacements at both ends of every planned sweep, (n,) each: the view should hold all of them."""
+        first, last = {}, {}
+        for step in self._bench.state.steps:
+            sweep = (step.joint, step.sweep)
+            first.setdefault(sweep, step.commanded)
+            last[sweep] = step.commanded
+        return tuple(self._bench.nominal_net(end) for end in (*first.values(), *last.values()))
 
     def follow(self, commanded: tuple[float, ...]) -> None:
         """Show the arms where commands put them."""
@@ -181,9 +190,9 @@ class CellView:
         if self._diagnosis is not None:
             self._diagnosis.visible = wanted
         shown = wanted and self._diagnosis is not None
-        self.arm.opacity = 0.35 if shown else None
+        self.arm.opacity = 0.2 if shown else None
         if self._axes is not None:
-            self._axes.labels_visible = not shown
+            self._axes.visible = not shown
 
     def light(self, spot: Spot | None) -> None:
         """Draw what a result speaks of in the colour of attention: a dimension, or the axis of a joint; None: none."""

@@ -19,7 +19,7 @@ def axis_uncertainty_figure(calibration: Calibration, width_px: int = WIDTH_PX) 
             _trace(joints, np.array([estimate.axis_std(j)[k] for j in joints]) * scale, name, k == 0)
             for estimate, name in pairs
         )
-        y = {"title_text": title, "type": "log", "dtick": 1, "zeroline": False, "minor": {"ticks": "outside"}}
+        y = {"title_text": title, "type": "log", "dtick": "D2", "zeroline": False}
         panels.append(Panel(traces, y, {"type": "category"}))
     return stacked("How well the axes are known", tuple(panels), "joint", 190, width_px=width_px, gap=0.07)
 

@@ -20,7 +20,7 @@ def deviations_figure(calibration: Calibration) -> go.Figure | None:
         return None
     panels = tuple(_panel(table[table["unit"] == unit], unit, first=unit == "mm") for unit in ("mm", "deg"))
     rows = max((table["unit"] == "mm").sum(), (table["unit"] == "deg").sum())
-    title = "Geometry: deviation from the design, with ±2 standard uncertainties"
+    title = "Deviation from the design, ±2 standard uncertainties"
     figure = beside(title, panels, 22 * int(rows) + 12, width_px=WIDE_PX)
     figure.layout.margin.l = 40
     return figure

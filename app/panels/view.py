@@ -83,8 +83,7 @@ class ViewPanel:
 
     def light(self, spot: Spot) -> None:
         """Draw what a result speaks of in the colour of attention."""
-        if spot.parameter:
-            self._geometry.value = True
+        self._geometry.value = bool(spot.parameter)
         self._cell.light(spot)
 
     def _slider(self, gui: "viser.GuiApi", name: str, range_: tuple[float, float, float], at: float, act: Callable):

@@ -40,15 +40,26 @@ class Camera:
 
 
 def presets(
-    bones: Skeleton, net: ArrayLike, stations: tuple[Station, ...] = (), floor_m: float | None = None
+    bones: Skeleton,
+    net: ArrayLike,
+    stations: tuple[Station, ...] = (),
+    floor_m: float | None = None,
+    extremes: tuple[ArrayLike, ...] = (),
 ) -> tuple[Camera, ...]:
-    """``All``, ``Arm``, ``Joint 1``.., ``Tool`` and the name of each station, for an arm at net displacements (n,)."""
-    motions = link_motions(bones.axes, bones.sliding, net)
-    joints = np.stack([apply(motions[i], hub) for i, hub in enumerate(bones.hubs_m)])
-    tool = apply(motions[-1], bones.tool_m)
+    """``All``, ``Arm``, ``Joint 1``.., ``Tool`` and the name of each station.
+
+    Args:
+        bones: of the arm.
+        net: net displacements of its joints, (n,).
+        stations: of the instrument.
+        floor_m: height of the floor.
+        extremes: other net displacements, (n,) each, at which the whole arm is to be seen too.
+    """
+    joints, tool = _spots(bones, net)
     # Links and levers stand out from the skeleton, and labels from them.
     thick = 0.11 * bones.reach_m
-    arm = np.vstack([p + sign * thick for p in (bones.base_m, joints, tool) for sign in (-1, 1)])
+    elsewhere = [p for other in extremes for p in _spots(bones, other)]
+    arm = np.vstack([p + sign * thick for p in (bones.base_m, joints, tool) for sign in (-1, 1)] + elsewhere)
     spots = [station.position_m for station in stations]
     feet = [np.array([p[0], p[1], p[2] if floor_m is None else floor_m]) for p in spots]
     side = viewing_direction(joints, tool, spots)
@@ -60,6 +71,13 @@ def presets(
         near("Tool", tool, side, close),
         *(through(station, arm) for station in stations if np.linalg.norm(arm.mean(axis=0) - station.position_m) > 0.2),
     )
+
+
+def _spots(bones: Skeleton, net: ArrayLike) -> tuple[Array, Array]:
+    """Where joints, (n, 3), and tool, (3,), are at net displacements, (n,)."""
+    motions = link_motions(bones.axes, bones.sliding, net)
+    joints = np.stack([apply(motions[i], hub) for i, hub in enumerate(bones.hubs_m)])
+    return joints, apply(motions[-1], bones.tool_m)
 
 
 def viewing_direction(joints_m: Array, tool_m: Array, stations_m: list[Array]) -> Array:
