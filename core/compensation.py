@@ -81,12 +81,19 @@ def compensate(
     return Compensation(pose, commanded, statuses(arm.nominal, found), found)
 
 
-def nominal_start(arm: CalibratedArm, wanted: Array, tolerance: Tolerance | None = None) -> Array:
-    """Net displacements with which the nominal arm takes poses (m, 4, 4), or comes nearest to them, (m, n)."""
+def nominal_start(
+    arm: CalibratedArm, wanted: Array, tolerance: Tolerance | None = None, near: Array | None = None
+) -> Array:
+    """Net displacements with which the nominal arm takes poses (m, 4, 4), or comes nearest to them, (m, n).
+
+    Args:
+        near: net displacements that choose the branch, (n,) or (m, n); None: zero, or what of it the limits allow.
+    """
     robot = arm.nominal_driven()
-    low, high = robot.limits.T
-    rest = np.clip(np.zeros(arm.nominal.joint_count), low, high)
-    return inverse_kinematics(robot, wanted, nominal_net(arm.nominal, rest)[0], tolerance).net
+    if near is None:
+        low, high = robot.limits.T
+        near = nominal_net(arm.nominal, np.clip(np.zeros(arm.nominal.joint_count), low, high))[0]
+    return inverse_kinematics(robot, wanted, near, tolerance).net
 
 
 def reached(arm: CalibratedArm, commanded: ArrayLike) -> Array:

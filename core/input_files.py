@@ -26,7 +26,15 @@ def read_text(path: Path, limit_bytes: int, error: type[InputError]) -> InputTex
     Raises:
         error: the file is missing, empty, larger than the limit, not UTF-8, or holds NUL bytes.
     """
-    data = _read_bytes(path, limit_bytes, error)
+    return decoded(path, _read_bytes(path, limit_bytes, error), error)
+
+
+def decoded(path: Path, data: bytes, error: type[InputError]) -> InputText:
+    """The text of a file whose bytes are at hand; ``path`` is what messages call it.
+
+    Raises:
+        error: it is empty, not UTF-8, or holds NUL bytes.
+    """
     if not data:
         raise error(f"{path} is empty (0 bytes)")
     try:

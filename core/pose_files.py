@@ -15,21 +15,25 @@ import csv
 import io
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from core.errors import CampaignError
 from core.geometry import Array
+from core.input_files import decoded
 from core.measurement_columns import POINT, Columns, match_columns
 from core.robot import Robot
 from core.rotations import quaternions, rotations_of_quaternions, rotations_of_turns, turns_of_rotations
-from core.text_table import TextTable, read_text_table
+from core.text_table import TextTable, read_text_table, text_table
 from core.units import ANGLE, LENGTH, displacement_units, from_si
 
 QUATERNION = ("qw", "qx", "qy", "qz")
 TURNS = ("rx", "ry", "rz")
 _JOINT_COLUMN = re.compile(r"q\d+(?=_|$)", re.ASCII)
+LARGEST_BYTES = 8_000_000
+"""Of poses that come through a browser."""
 UNIT_SLACK = 1e-3
 """A quaternion longer or shorter than 1 by more than this is a mistake and not rounding."""
 
@@ -59,7 +63,30 @@ def read_poses(path: Path | str, robot: Robot) -> PoseTable:
     Raises:
         CampaignError: a column or a cell is not as expected; the message names row, column and value.
     """
-    table, _ = read_text_table(Path(path), "a pose")
+    return _poses(read_text_table(Path(path), "a pose")[0], robot)
+
+
+def poses_of_bytes(data: bytes, name: str, robot: Robot) -> PoseTable:
+    """The poses of a CSV file that was sent or pasted; cells may be parted by tabs, as spreadsheets copy them.
+
+    Args:
+        data: the bytes of the file.
+        name: what messages call it.
+        robot: tells which joints have a command, and their units.
+
+    Raises:
+        CampaignError: it is too large, or as for ``read_poses``.
+    """
+    if len(data) > LARGEST_BYTES:
+        raise CampaignError(f"{name} has {len(data) / 1e6:.1f} MB, expected at most {LARGEST_BYTES / 1e6:g} MB")
+    source = decoded(Path(name), data, CampaignError)
+    head = source.text.partition("\n")[0]
+    if "\t" in head and "," not in head:
+        source = replace(source, text=source.text.replace("\t", ","))
+    return _poses(text_table(source, "a pose"), robot)
+
+
+def _poses(table: TextTable, robot: Robot) -> PoseTable:
     moving = {f"q{i + 1}": displacement_units(robot.joints[i].slides) for i in np.flatnonzero(robot.commanded)}
     units = {**{base: LENGTH for base in POINT}, **{base: ANGLE for base in TURNS}, **moving}
     _require_known_joints(table, robot)

@@ -121,6 +121,12 @@ def read_text_table(path: Path, thing: str = "a measured point") -> tuple[TextTa
         CampaignError: missing, empty, too large, not UTF-8, a column twice, a ragged row, or no row at all.
     """
     source = read_text(path, LIMIT_BYTES, CampaignError)
+    return text_table(source, thing), source.data
+
+
+def text_table(source: InputText, thing: str = "a measured point") -> TextTable:
+    """The table in the text of a CSV file; arguments and errors as for ``read_text_table``."""
+    path = source.path
     reader = csv.reader(io.StringIO(source.text, newline=""), strict=True)
     lines: list[int] = []
     try:
@@ -133,7 +139,7 @@ def read_text_table(path: Path, thing: str = "a measured point") -> tuple[TextTa
         raise CampaignError(f"{path}, row {reader.line_num}: {told}, expected plain CSV") from None
     if not lines:
         raise CampaignError(f"{path} has a header and no rows, expected one row for {thing}")
-    return TextTable(path, dict(zip(header, columns, strict=True)), lines), source.data
+    return TextTable(path, dict(zip(header, columns, strict=True)), lines)
 
 
 def _header(source: InputText, cells: list[str]) -> list[str]:

@@ -45,7 +45,7 @@ RESULTS = """
 """
 USE = """
     core.driven_robot core.pose_iteration core.pose_seeds core.inverse_kinematics
-    core.calibrated_arm core.calibration_file core.pose_files core.compensation
+    core.calibrated_arm core.calibration_file core.pose_files core.compensation core.compensation_effect
     core.rigid_pose core.standstills core.pose_visits core.end_effector
     core.verification core.pose_loop core.repeatability core.verification_json
     core.robot_export core.dh_export core.gap
@@ -57,6 +57,7 @@ APP = """
     app.figures app.report_page app.report_cells app.report_words app.report_tables app.captions app.report_html
     app.verification_report app.gap_tables app.gap_report app.gap_summary app.blind_report
     app.scene app.rigs app.workbench app.pose_bench app.jobs app.spots app.clicks app.words app.table_2 app.cell_view
+    app.glossary app.keys app.uploads app.measure_words
     app.pose_view app.pose_words app.gap_bench app.gap_words app.gap_view app.panels app.verify_tabs app.gap_tabs
     app.dashboard
     app.commands app.__main__

@@ -9,7 +9,7 @@ from random_arms import random_rotation
 
 from core.errors import CampaignError
 from core.geometry import rotation_about
-from core.pose_files import poses_csv, read_poses
+from core.pose_files import poses_csv, poses_of_bytes, read_poses
 from core.rotations import quaternions, turns_of_rotations
 from core.twin.irb_l6_arm import nominal_robot
 from core.twin.scara import cell as scara_cell
@@ -127,3 +127,19 @@ def test_what_is_wrong_is_said(text: str, words: list[str], tmp_path: Path) -> N
         read_poses(path, nominal_robot())
     for word in (str(path), *words):
         assert word in str(refused.value)
+
+
+def test_poses_may_be_pasted_with_tabs_as_spreadsheets_copy_them() -> None:
+    poses = random_poses(4)
+    four = quaternions(poses[:, :3, :3])
+    header = "x_mm,y_mm,z_mm,qw,qx,qy,qz"
+    values = np.hstack([poses[:, :3, 3] * 1e3, four])
+    text = "\n".join([header, *(",".join(repr(float(v)) for v in row) for row in values)])
+    for pasted in (text, text.replace(",", "\t"), text.replace("\n", "\r\n") + "\r\n"):
+        found = poses_of_bytes(pasted.encode(), "pasted poses", nominal_robot())
+        np.testing.assert_allclose(found.poses, poses, rtol=0, atol=1e-12)
+    with pytest.raises(CampaignError, match="^pasted poses, row 3, column y_mm: 'here', expected a number"):
+        poses_of_bytes(f"{header}\n1,2,3,1,0,0,0\n1,here,3,1,0,0,0\n".encode(), "pasted poses", nominal_robot())
+    for data, words in ((b"", "is empty"), (b"\xff", "is not UTF-8"), (b"x" * 9_000_000, "9.0 MB, expected at most 8")):
+        with pytest.raises(CampaignError, match=words):
+            poses_of_bytes(data, "pasted poses", nominal_robot())
