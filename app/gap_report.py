@@ -158,16 +158,18 @@ def _causes(report: GapReport) -> Section:
 
 
 def _space(report: GapReport) -> Section | None:
-    figure = gap_vectors_figure(report)
+    figure = None if report.verdict is Verdict.NO_GAP else gap_vectors_figure(report)
     if figure is None:
         return None
-    caption = (
-        "Arrows begin where the sim has a point and end where it was measured, magnified. Tick a cause "
-        "to add it to the sim: what is left of the arrows is what it does not explain. Turn with the mouse."
+    caption, names = (
+        "Arrows begin where the sim has a point and end where it was measured, magnified.",
+        switch_names(report),
     )
+    if names:
+        caption += " Tick a cause to add it to the sim: what is left of the arrows is what it does not explain."
     text = (_sentence(report.where.worst_region),) if report.where.worst_region else ()
-    names = switch_names(report)
-    return Section("space", "The worst region", _typeset(text), plots=(Plot(figure, caption, names),))
+    plot = Plot(figure, f"{caption} Turn with the mouse.", names)
+    return Section("space", "The worst region", _typeset(text), plots=(plot,))
 
 
 def _where(report: GapReport) -> Section:

@@ -57,7 +57,7 @@ def gap_vectors_figure(report: GapReport, width_px: int = WIDE_PX, shown: int = 
         "scene": {
             **{f"{axis}axis": _axis(axis) for axis in "xyz"},
             "aspectmode": "data",
-            "camera": {"eye": {"x": 1.15, "y": -1.15, "z": 0.7}, "center": {"x": 0, "y": 0, "z": -0.1}},
+            "camera": {"eye": {"x": 1.25, "y": -1.25, "z": 0.75}, "center": {"x": 0, "y": 0, "z": -0.16}},
         },
     }
     return go.Figure(data=traces, layout=layout)

@@ -48,7 +48,7 @@ def percent(share: float) -> str:
     """A share as per cent, with a decimal next to none and all; what is not known is said to be so."""
     if not math.isfinite(share):
         return "not known"
-    near = 0 < abs(share) < 0.01 or 0 < abs(1 - share) < 0.01
+    near = 0.0005 < abs(share) < 0.01 or 0.0005 < abs(1 - share) < 0.01
     return f"{fixed(100 * share, 1 if near else 0)} %"
 
 

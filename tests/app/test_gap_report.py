@@ -50,7 +50,7 @@ def test_the_page_has_everything_that_a_decision_needs() -> None:
         *("reliability", "method"),
     ]
     assert [section.id for section in gap_page(made("no_gap")).sections] == [
-        *("shrinks", "causes", "space", "where", "unknown", "noise", "limits", "method"),
+        *("shrinks", "causes", "where", "unknown", "noise", "limits", "method"),
     ]
 
 

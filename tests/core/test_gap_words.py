@@ -8,7 +8,7 @@ import pytest
 from core.gap.ledger import closed_share, difference_with, ledger
 from core.gap.place_words import MEANINGS, NAMES, cause_words, listed, place_words
 from core.gap.result import Place
-from core.gap.verdict_words import left_sentence, length_words, next_sentence, verdict_sentence
+from core.gap.verdict_words import left_sentence, length_words, next_sentence, percent, verdict_sentence
 from tests.core import gap_reports
 
 MADE = ("explained", "partly_explained", "unexplained", "no_gap", "barely_known")
@@ -104,3 +104,19 @@ def test_what_to_measure_next_says_how_well_it_would_do() -> None:
     first, second = made("explained").rivals
     assert "4.2 standard deviations" in next_sentence(first)
     assert "standard deviations" not in next_sentence(second)
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [
+        (0.5, "50 %"),
+        (0.997, "99.7 %"),
+        (0.99999, "100 %"),
+        (1.0, "100 %"),
+        (0.003, "0.3 %"),
+        (0.0, "0 %"),
+        (np.nan, "not known"),
+    ],
+)
+def test_shares_next_to_none_and_all_keep_a_decimal(share: float, words: str) -> None:
+    assert percent(share) == words
