@@ -34,7 +34,7 @@ def _description(session: Session) -> str:
     targets = "".join(f'[[target]]\nname = "T{t + 1}"\nlink = {session.arm.count}\n' for t in range(session.targets))
     return (
         'format = "trueaxis-campaign/1"\ntitle = "Simulated arm, withheld suite"\nrobot = "robot.toml"\n'
-        'joint_values = "commanded"\n[instrument]\nkind = "laser-tracker"\n'
+        f'joint_values = "{"readback" if session.readback else "commanded"}"\n[instrument]\nkind = "laser-tracker"\n'
         f"sigma_mm = {SIGMA_M * 1e3:g}\n{targets}"
     )
 

@@ -112,4 +112,5 @@ def truth_of(case: Case, made: Made) -> dict[str, object]:
         "points": int(made.session.measured.sum()),
         "records": len(made.session.q),
         "in_motion": bool(made.session.speed.any()),
+        "readback": made.session.readback,
     }

@@ -1,7 +1,5 @@
 """Worlds with more than one hidden effect: two of like strength, or one among four small ones."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from tests.benchmarks.withheld.absorbed import Absorber
@@ -54,4 +52,4 @@ def cluttered_world(arm: Arm, name: str, gap: float, rng: np.random.Generator) -
             continue
         around.append(small)
         again += lost
-    return replace(World(session, random_clutter(arm, rng), (main, *around)), drawn_again=again)
+    return World(session, random_clutter(arm, rng), (main, *around), again)

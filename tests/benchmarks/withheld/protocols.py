@@ -34,16 +34,21 @@ class Plan:
     """Poses in a row between sweeps."""
     held: tuple[int, ...] = ()
     """Joints that never move, from 0; not the first."""
+    readback: bool = False
+    """Whether joints are read back rather than taken as commanded."""
 
 
-def random_plan(rng: np.random.Generator, in_motion: bool = False, targets: int | None = None) -> Plan:
-    """One of the ways to measure richly; some users also measure in motion though nothing calls for it."""
+def random_plan(
+    rng: np.random.Generator, in_motion: bool = False, targets: int | None = None, readback: bool | None = None
+) -> Plan:
+    """One of the ways to measure richly; some measure in motion or read joints back though nothing calls for it."""
     several = int(rng.choice([1, 2, 2, 3, 3])) if targets is None else targets
     return Plan(
         targets=several,
         sweep_points={1: 540, 2: 420, 3: 400}[several],
         poses={1: 110, 2: 90, 3: 80}[several],
         in_motion=in_motion or bool(rng.random() < 0.3),
+        readback=bool(rng.random() < 0.2) if readback is None else readback,
     )
 
 
@@ -65,7 +70,7 @@ def rich_session(arm: Arm, rng: np.random.Generator, plan: Plan | None = None) -
         for job in blocks[k]:
             job(diary)
     sweep_job(arm, rng, homes[0], 0, 2, plan)(diary)
-    return diary.session(random_places(rng, plan.targets), random_base(rng))
+    return diary.session(random_places(rng, plan.targets), random_base(rng), plan.readback)
 
 
 def _jobs(arm: Arm, rng: np.random.Generator, homes: Array, plan: Plan) -> tuple[list[Job], list[Job]]:

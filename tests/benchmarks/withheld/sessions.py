@@ -44,6 +44,8 @@ class Session:
     """True places of the targets in the last frame, (targets, 3)."""
     base: Array
     """True place of the arm's base before the instrument, (4, 4)."""
+    readback: bool = False
+    """Whether the q columns were read from the encoders rather than commanded."""
 
     @property
     def measured(self) -> np.ndarray:
@@ -162,7 +164,7 @@ class Diary:
         self.senses.append(self.sense)
         self.speeds.append((still if speed is None else speed, still if bend is None else bend))
 
-    def session(self, places_m: Array, base: Array) -> Session:
+    def session(self, places_m: Array, base: Array, readback: bool = False) -> Session:
         """Everything written so far as one record."""
         phase, joint, sweep, step, pose, target, time_s, payload = (
             np.array(column) for column in zip(*self.rows, strict=True)
@@ -184,6 +186,7 @@ class Diary:
             payload,
             places_m,
             base,
+            readback,
         )
 
 

@@ -124,15 +124,13 @@ def hide_seen(
     raise ValueError(f"no draw of {TRIES} can be seen on {session.arm.key}")
 
 
-def single_world(
-    arm: Arm, draw: Draw, gap: float, rng: np.random.Generator, in_motion: bool = False, targets: int | None = None
-) -> World:
-    """A world with one effect.
+def single_world(arm: Arm, draw: Draw, gap: float, rng: np.random.Generator, **wanted: object) -> World:
+    """A world with one effect; ``wanted`` of its session, see ``random_plan``.
 
     Raises:
         ValueError: it cannot be seen on this arm.
     """
-    session = rich_session(arm, rng, random_plan(rng, in_motion, targets))
+    session = rich_session(arm, rng, random_plan(rng, **wanted))
     hidden, again = hide_seen(session, Absorber(session), draw, gap, rng)
     return World(session, random_clutter(arm, rng), (hidden,), again)
 
@@ -142,8 +140,12 @@ def random_clutter(arm: Arm, rng: np.random.Generator) -> Array:
 
 
 def needs(*effects: str) -> dict[str, object]:
-    """What a session must have for effects to be seen at all: motion, or targets to compare."""
-    return ({"in_motion": True} if "latency" in effects else {}) | ({"targets": 3} if "target_slip" in effects else {})
+    """What a session must have for effects to be seen at all: motion, or targets to compare.
+
+    An encoder that knows whole steps would read whole steps: there commands are what is written.
+    """
+    asked = {"latency": {"in_motion": True}, "target_slip": {"targets": 3}, "quantisation": {"readback": False}}
+    return {key: value for effect in effects for key, value in asked.get(effect, {}).items()}
 
 
 def make_campaign(
@@ -172,4 +174,5 @@ def make_campaign(
 
 def fresh_session(session: Session, rng: np.random.Generator) -> Session:
     """Another day at the same arm: other poses, sweeps, order, base and targets, as many of them."""
-    return rich_session(session.arm, rng, random_plan(rng, bool(session.speed.any()), session.targets))
+    plan = random_plan(rng, bool(session.speed.any()), session.targets, session.readback)
+    return rich_session(session.arm, rng, plan)

@@ -127,20 +127,18 @@ class Quantisation:
 
 @dataclass(frozen=True)
 class Latency:
-    """The arm is where it was told to be a moment ago (or its reading is), while it swings like a pendulum."""
+    """The arm is where it was told to be a moment ago, or what was read is where it was; it swings like a pendulum."""
 
     joint: int | None
     """None: every joint."""
-    sign: float
-    """+1: the arm lags behind the command; -1: what was written was read late."""
 
     @classmethod
     def draw(cls, arm: Arm, rng: np.random.Generator) -> "Latency":
-        joint = any_joint(arm, rng) if rng.random() < 0.5 else None
-        return cls(joint, float(rng.choice([-1, 1])))
+        return cls(any_joint(arm, rng) if rng.random() < 0.5 else None)
 
     def disturb(self, session: Session, size: float) -> Disturbance:
-        delay = 2e-3 * size * self.sign
+        # A late reading is where the arm was: by the time of the measurement it has moved on.
+        delay = -2e-3 * size if session.readback else 2e-3 * size
         wrong = -session.speed * delay + 0.5 * session.bend * delay**2
         if self.joint is not None:
             wrong = only_joint(session, self.joint, wrong[:, self.joint])

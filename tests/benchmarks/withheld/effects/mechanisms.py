@@ -30,7 +30,7 @@ class Coupling:
 
     def disturb(self, session: Session, size: float) -> Disturbance:
         x = session.arm.active(session.q)[:, self.source]
-        leaked = 1e-3 * self.sign * size * (x + 0.05 * np.sin(2 * x + self.start))
+        leaked = 1e-3 * self.sign * size * (x + 0.05 * (np.sin(2 * x + self.start) - np.sin(self.start)))
         return Disturbance(turn=only_joint(session, self.to, leaked))
 
     def answer(self, session: Session) -> dict[str, object]:
@@ -57,7 +57,9 @@ class Linkage(JointEffect):
     def disturb(self, session: Session, size: float) -> Disturbance:
         middle = session.arm.homes.mean(axis=0)[self.joint]
         crank = session.q[:, self.joint] - middle + self.start
-        return Disturbance(turn=only_joint(session, self.joint, self._rocker(crank, size) - crank))
+        # Mastered in the middle of its range: there it is right.
+        wrong = self._rocker(crank, size) - crank - (self._rocker(np.array([self.start]), size) - self.start)
+        return Disturbance(turn=only_joint(session, self.joint, wrong))
 
     def _rocker(self, crank: Array, size: float) -> Array:
         """Angle of the rocker for that of the crank: where two circles meet, on the parallelogram's branch."""

@@ -53,6 +53,8 @@ class AxisWobble(JointEffect):
         joint = any_joint(arm, rng)
         spread = np.array([1e-3, 1e-3, 0, 4e-4, 4e-4, 2e-4]) * _tilt_or_shift(rng)
         knots = rng.normal(0, 1, (5, 6)) * spread
+        # What it does on average is the link's geometry and no wobble.
+        knots -= knots.mean(axis=0)
         path = CubicSpline(np.arange(6) / 5, np.concatenate([knots, knots[:1]]), bc_type="periodic")
         # A slide has no turn: its guide bends over a length a little longer than what it travels.
         period = 2 * np.pi if not arm.chain.sliding[joint] else 2.6 * arm.reach[joint]
