@@ -10,9 +10,11 @@ import os
 import socket
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import viser
 
+from app import keys
 from app.cell_view import CellView
 from app.clicks import Ear
 from app.gap_tabs import GapTabs
@@ -27,6 +29,7 @@ from app.panels.start import StartPanel
 from app.panels.view import ViewPanel
 from app.scene.cameras import fly_to
 from app.spots import spot_named
+from app.uploads import guard_uploads
 from app.verify_tabs import VerifyTabs
 from app.words import STYLE
 from app.workbench import Workbench
@@ -47,9 +50,17 @@ class Dashboard:
         self.bench, self.jobs = bench, Jobs()
         self.server = _server(host, port)
         self.host, self.port = host, self.server.get_port()
-        gui = self.server.gui
-        gui.configure_theme(**THEME)
+        self.server.gui.configure_theme(**THEME)
         self.seat = Seat(self.server)
+        guard_uploads(self.server, self.seat.may, self._refuse)
+        self._dark = False
+        self._draw_page()
+        bench.on_change(self.refresh)
+
+    def _draw_page(self) -> None:
+        """Scene and panels for the robot of the session."""
+        gui, bench = self.server.gui, self.bench
+        self._drawn_for = bench.rig.robot
         self.cell = CellView(self.server, bench)
         self.cell.points.on_click(self._clicked)
         self._look_at_the_cell()
@@ -74,17 +85,24 @@ class Dashboard:
         self.results = ResultsPanel(gui, bench, self.ask)
         self.verify = VerifyTabs(self.server, bench, tabs, self.results.panel, self.cell, self.ask)
         self.gap = GapTabs(self.server, bench, tabs, self.results.panel, self.ask)
-        bench.on_change(self.refresh)
         self._hotkeys()
-        self.refresh()
+        self._show_all()
         gui.add_html("<i data-testid='app-ready' hidden></i>")
 
-    def ask(self, event: "viser.GuiEvent | None", job, operator: bool = True) -> None:
-        """Queue a job for the worker on behalf of whoever pressed something; watchers are told that they only watch."""
+    def ask(self, event: "viser.GuiEvent | None", job, operator: bool = True, at_once: bool = False) -> None:
+        """Do a job on behalf of whoever pressed something; watchers are told that they only watch.
+
+        Args:
+            event: of the page; None: nobody in particular.
+            job: takes the browser that asked, or None.
+            operator: whether only who holds the seat may ask for it.
+            at_once: do not wait for what is in progress, as for stopping it.
+        """
         client = getattr(event, "client", None)
         if operator and not self._may(event):
             return
-        self.jobs.ask(lambda: job(client), lambda sentence: self.say(client, sentence))
+        ask = self.jobs.at_once if at_once else self.jobs.ask
+        ask(lambda: job(client), lambda sentence: self.say(client, sentence))
 
     def _may(self, event: "viser.GuiEvent | None") -> bool:
         """Whether who pressed something may act; watchers are told that they only watch."""
@@ -100,8 +118,21 @@ class Dashboard:
             with contextlib.suppress(Exception):
                 one.add_notification("This was not done", sentence, color="red", auto_close_seconds=15)
 
+    def _refuse(self, client_id: int, sentence: str) -> None:
+        """Tell a browser that what it sent is not taken."""
+        self.say(self.server.get_clients().get(client_id), sentence)
+
     def refresh(self) -> None:
-        """Draw everything anew from the session."""
+        """Draw everything anew from the session; the whole page where the robot is another one."""
+        if self.bench.rig.robot is self._drawn_for:
+            self._show_all()
+            return
+        with self.server.atomic():
+            self.server.gui.reset()
+            self.server.scene.reset()
+            self._draw_page()
+
+    def _show_all(self) -> None:
         with self.server.atomic():
             if self.bench.calibration is None:
                 self.cell.forget()
@@ -142,6 +173,7 @@ class Dashboard:
 
     def _said(self, client: viser.ClientHandle, word: str) -> None:
         """A finding or a row of a table was clicked: show it where it is, and fly there."""
+        self.acquire.heard(SimpleNamespace(client=client), word)
         spot = spot_named(word)
         if spot is None:
             self.verify.heard(client, word)
@@ -159,14 +191,18 @@ class Dashboard:
 
     def _hotkeys(self) -> None:
         gui = self.server.gui
-        for label, hotkey, action in (
-            ("Measure the next shot", "space", self.acquire.measure),
-            ("Undo", "backspace", self.acquire.undo),
-            ("Measure the chosen shot again", "R", self.acquire.measure_again),
-            ("Solve", "S", self.solve.solve),
+        for key, action in (
+            (keys.MEASURE, self.acquire.measure),
+            (keys.ENTER, self.acquire.measure),
+            (keys.UNDO, self.acquire.undo),
+            (keys.REDO, self.acquire.redo),
+            (keys.AGAIN, self.acquire.measure_again),
+            (keys.SKIP, self.acquire.skip),
+            (keys.PAUSE, self.acquire.pause),
+            (keys.STOP, self.acquire.stop),
+            (keys.SOLVE, self.solve.solve),
         ):
-            command = gui.add_command(label, hotkey=hotkey)
-            command.on_trigger(action)
+            gui.add_command(key.does, hotkey=key.hotkey).on_trigger(action)
 
 
 def _server(host: str, port: int) -> viser.ViserServer:

@@ -38,6 +38,11 @@ class Jobs:
         """
         self._queue.put((job, report))
 
+    @staticmethod
+    def at_once(job: Callable[[], None], report: Report) -> None:
+        """Do a short job now, on the caller's thread, whatever the worker is at: to stop it, say."""
+        _do(job, report)
+
     def wait(self) -> None:
         """Block until everything that was asked for is done."""
         self._queue.join()
@@ -52,16 +57,20 @@ class Jobs:
             job, report = item
             self._busy.set()
             try:
-                job()
-            except TrueaxisError as error:
-                LOG.info("refused: %s", error)
-                report(str(error))
-            except Exception as error:
-                LOG.exception("a job failed")
-                report(
-                    f"This did not work ({type(error).__name__}: {error}). Nothing was lost; the log has the details."
-                )
+                _do(job, report)
             finally:
                 self._busy.clear()
                 self._queue.task_done()
         self._queue.task_done()
+
+
+def _do(job: Callable[[], None], report: Report) -> None:
+    """Do a job; what goes wrong is reported in a sentence, the trace goes to the log."""
+    try:
+        job()
+    except TrueaxisError as error:
+        LOG.info("refused: %s", error)
+        report(str(error))
+    except Exception as error:
+        LOG.exception("a job failed")
+        report(f"This did not work ({type(error).__name__}: {error}). Nothing was lost; the log has the details.")

@@ -20,6 +20,7 @@ from core.geometry import Array
 from core.instruments import PointMeter, RobotDriver
 from core.robot import Joint, JointKind, Robot
 from core.session_state import State
+from core.theodolite import Theodolite
 from core.twin import irb_l6, scara
 from core.twin.cell import Cell
 from core.twin.instrument import DemoInstrument, DemoRobot
@@ -53,6 +54,12 @@ class Rig:
     """Names and places of the instrument's stations, (3,) each, in its own frame."""
     cell: Cell | None
     """What is simulated; None: nothing is."""
+
+    @property
+    def theodolites(self) -> tuple[Theodolite, Theodolite] | None:
+        """The stations, if they are theodolites whose places are known."""
+        pair = None if self.cell is None else self.cell.instrument
+        return (pair.left, pair.right) if isinstance(pair, TheodolitePair) else None
 
     @property
     def base(self) -> Array | None:

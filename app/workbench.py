@@ -28,8 +28,16 @@ from core.robot import Robot
 from core.session import Session
 from core.session_campaign import to_campaign
 from core.session_conditions import conditions_of
-from core.session_events import CheckShot, Failed, Judged, SessionError, ShotTaken, Skipped, Solved, WentTo
-from core.session_live import Expected, base_of, base_so_far, expected_place, sweep_so_far
+from core.session_events import CheckShot, Event, Failed, Judged, SessionError, ShotTaken, Skipped, Solved, WentTo
+from core.session_live import (
+    Expected,
+    SweepSoFar,
+    base_of,
+    base_so_far,
+    expected_place,
+    sweep_so_far,
+    tool_place_std_m,
+)
 from core.session_plan import PlannedSweep, Step
 from core.session_shots import shot_at
 from core.session_state import Shot, State
@@ -371,8 +379,21 @@ class Workbench:
 
     def live(self, joint: int, sweep: int) -> tuple[LiveSweep, tuple[Shot, ...]]:
         """The axis of a sweep so far, and the shots that it rests on."""
-        so_far = sweep_so_far(self.state, joint, sweep)
+        so_far = self.so_far(joint, sweep)
         return so_far.live, so_far.shots
+
+    def so_far(self, joint: int, sweep: int) -> SweepSoFar:
+        """A sweep as far as it is measured."""
+        return sweep_so_far(self.state, joint, sweep)
+
+    def tool_std_m(self, so_far: SweepSoFar) -> float | None:
+        """How well the place of a sweep's axis is known at the tool, m; None: there is no axis or no tool yet."""
+        return tool_place_std_m(self.state, so_far)
+
+    def undo_event(self) -> Event | None:
+        """What an undo would take back; None: nothing."""
+        number = self.state.undo_next
+        return None if number is None or number < self.session.began else self.session.event(number)
 
     def base(self) -> Placement:
         """Where the robot's base stands in the instrument's frame, as well as it is known."""
@@ -385,6 +406,14 @@ class Workbench:
         """About where the target of the next shot will be; None: not known yet."""
         step, base = self.state.next_step, self.base()
         return None if step is None else expected_place(self.state, step, base.base if base.settled else None)
+
+    def aims(self, expected: Expected | None) -> tuple[str, ...]:
+        """How each theodolite is to be aimed at an expected place, in sentences; none for other instruments."""
+        if expected is None or self.rig.theodolites is None:
+            return ()
+        names = (name for name, _ in self.rig.stations)
+        angles = (np.rad2deg(station.observe(expected.point_m)[0]) for station in self.rig.theodolites)
+        return tuple(f"{name}: hz {hz:.3f}°, v {v:.3f}°" for name, (hz, v) in zip(names, angles, strict=True))
 
     @property
     def centre(self) -> Array:

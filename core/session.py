@@ -16,7 +16,7 @@ from typing import Self
 
 from core.session_checks import check_event
 from core.session_entries import Entry, new_entry
-from core.session_events import Closed, Copied, Created, Event, Opened, Redo, SessionError, Undo
+from core.session_events import AnyEvent, Closed, Copied, Created, Event, Opened, Redo, SessionError, Undo
 from core.session_fold import applied
 from core.session_lock import LockRefused, WriteLock, lock_for, writer_of
 from core.session_reader import Contents, check_readable, read_after, read_contents
@@ -102,6 +102,15 @@ class Session:
         """Every event that ever was, with number, time and author."""
         with self._guard:
             return self._timeline.entries
+
+    def event(self, seq: int) -> AnyEvent:
+        """The event of a number.
+
+        Raises:
+            KeyError: there is none.
+        """
+        with self._guard:
+            return self._timeline.entry(seq).event
 
     @property
     def began(self) -> int:

@@ -41,6 +41,14 @@ class Timeline:
         """The largest number so far; 0: nothing yet."""
         return next(reversed(self._entries), 0)
 
+    def entry(self, seq: int) -> Entry:
+        """The entry of a number.
+
+        Raises:
+            KeyError: there is none.
+        """
+        return self._entries[seq]
+
     @property
     def first_opened(self) -> int:
         """The number of the first entry by which a program opened the file; one beyond the last: there is none."""

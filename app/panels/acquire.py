@@ -1,18 +1,31 @@
 """Measuring: what to do now, one big button, what the last shot is worth, and the living table of sweeps."""
 
+import time
 from collections.abc import Callable
-from html import escape
 from typing import TYPE_CHECKING
 
 import viser
 
-from app.words import block, step_words, sweeps_table, verdict_words
+from app.measure_words import (
+    SWEEP_WORD,
+    run_words,
+    shot_words,
+    step_words,
+    sweeps_table,
+    undo_words,
+    verdict_words,
+)
+from app.panels.extra_stop import ExtraStop
+from app.panels.typed_points import TypedPoints
 from app.workbench import Workbench
+from core.errors import InputError
 
 if TYPE_CHECKING:
     from core.session_state import Shot
 
-REASONS = ("target was bumped", "wrong target", "robot had not settled", "sight was blocked", "other")
+REASONS = ("target was bumped", "wrong target", "robot had not settled", "sight was blocked", "in my own words")
+OWN_WORDS = REASONS[-1]
+RUNNING = "The robot is running: press Pause (P) or Stop (Esc) first."
 
 
 class AcquirePanel:
@@ -21,44 +34,50 @@ class AcquirePanel:
     def __init__(self, gui: viser.GuiApi, bench: Workbench, ask: Callable) -> None:
         self._bench, self._ask = bench, ask
         self._chosen: int | None = None
+        self._began, self._done, self._total = 0.0, 0, 0
         self._step = gui.add_html("")
-        gui.add_button("Measure", color="green", icon=viser.Icon.CROSSHAIR, hint="Space").on_click(self.measure)
+        self._typed = TypedPoints(gui, bench)
+        gui.add_button("Measure", color="green", icon=viser.Icon.CROSSHAIR, hint="Space or Enter").on_click(
+            self.measure
+        )
+        self._typed.build_file(gui, self._ask)
         self._verdict = gui.add_html("")
-        run = gui.add_button_group("Demo robot", ("Run this sweep", "Run all", "Stop"))
-        run.on_click(self._run)
+        self._run_group = gui.add_button_group("Robot", ("Run this sweep", "Run all", "Pause", "Stop"))
+        self._run_group.on_click(self._run)
         self._bar = gui.add_progress_bar(0.0)
-        history = gui.add_button_group("History", ("Undo", "Redo", "Skip stop"))
-        history.on_click(self._history)
+        self._running = gui.add_html("")
+        self._history = gui.add_button_group("History", ("Undo", "Redo", "Skip"))
+        self._history.on_click(self._changed_mind)
+        self._undo = gui.add_html("")
         self._table = gui.add_html("")
         with gui.add_folder("Chosen shot"):
             self._shot = gui.add_html("")
-            self._reason = gui.add_dropdown("Reason", REASONS)
-            act = gui.add_button_group("This shot", ("Measure again", "Exclude", "Include"))
-            act.on_click(self._act)
-        self._run_group, self._history_group, self._act_group = run, history, act
+            self._act_group = gui.add_button_group("This shot", ("Measure again", "Exclude", "Include"))
+            self._act_group.on_click(self._act)
+            self._reason = gui.add_dropdown("Reason", REASONS, hint="Of excluding or skipping; kept with the shot.")
+            self._words = gui.add_text("In my words", "", visible=False)
+            self._reason.on_update(lambda _: setattr(self._words, "visible", self._reason.value == OWN_WORDS))
+        self._extra = ExtraStop(gui, bench, self._ask_at_rest)
 
     def refresh(self) -> None:
         """Show where the session stands."""
-        state = self._bench.state
-        self._step.content = step_words(state, self._bench.nominal)
-        rows = self._bench.progress()
-        self._table.content = sweeps_table(rows)
-        total = sum(r.planned.shots for r in rows)
-        self._bar.value = 100.0 * sum(min(r.done, r.planned.shots) for r in rows) / max(total, 1)
-        last = next((s for s in reversed(state.shots) if s.taken.phase == "sweep"), None)
-        if last is None:
-            self._verdict.content = block(
-                "<p class='soft'>No shot yet. Press <b>Measure</b>, or let the robot run.</p>", "verdict"
-            )
-        else:
-            live, shots = self._bench.live(last.taken.joint, last.taken.sweep)
-            self._verdict.content = verdict_words(live, shots, last.taken.joint)
-        if self._chosen is None and last is not None:
-            self._show_shot(last, chosen=False)
-        elif self._chosen is not None:
-            shot = state.shot(self._chosen)
-            if shot is not None:
-                self._show_shot(shot, chosen=True)
+        bench, state = self._bench, self._bench.state
+        expected = bench.expected()
+        self._step.content = step_words(
+            state, bench.nominal, not bench.rig.moves_itself, expected, bench.aims(expected)
+        )
+        rows = bench.progress()
+        self._table.content = sweeps_table(rows, bench.nominal)
+        total = sum(row.planned.shots for row in rows)
+        self._bar.value = 100.0 * sum(row.planned.shots - row.left for row in rows) / max(total, 1)
+        self._verdict.content = self._last_verdict()
+        self._undo.content = undo_words(bench.undo_event(), state)
+        self._run_group.visible = self._bar.visible = bench.rig.moves_itself
+        self._show_run()
+        chosen = None if self._chosen is None else state.shot(self._chosen)
+        self._shot.content = shot_words(chosen or self._last(), chosen is not None)
+        self._typed.refresh()
+        self._extra.refresh()
 
     def choose(self, number: int) -> None:
         """Choose a shot, as by a click in 3-D."""
@@ -66,62 +85,142 @@ class AcquirePanel:
         self.refresh()
 
     def measure(self, event: object) -> None:
-        """Take the next planned shot."""
+        """Take the next planned shot, or those that were typed in."""
         self._chosen = None
-        self._ask(event, lambda client: self._bench.measure())
+        typed = self._typed.take()
+        if typed is None:
+            self._ask_at_rest(event, self._bench.measure)
+            return
+
+        def job() -> None:
+            self._bench.enter(*typed)
+            self._typed.clear()
+
+        self._ask_at_rest(event, job)
 
     def undo(self, event: object) -> None:
         """Take back the last thing."""
-        self._ask(event, lambda client: self._bench.undo())
+        self._ask_at_rest(event, self._bench.undo)
+
+    def redo(self, event: object) -> None:
+        """Bring back what was taken back last."""
+        self._ask_at_rest(event, self._bench.redo)
+
+    def skip(self, event: object) -> None:
+        """Leave out the next shot."""
+        reason = self._said()
+        self._ask_at_rest(event, lambda: self._bench.skip(reason))
 
     def measure_again(self, event: object) -> None:
         """Measure the chosen shot, or the last one, again."""
-        number = self._number()
-        if number is not None:
-            self._chosen = None
-            self._ask(event, lambda client: self._bench.measure_again(number))
+        number, typed = self._number(), self._typed.take()
+        if number is None:
+            return
+        self._chosen = None
+
+        def job() -> None:
+            if typed is not None and self._bench.lay_ready(*typed) != 1:
+                raise InputError("one shot is measured again, expected one line of coordinates")
+            self._bench.measure_again(number)
+            self._typed.clear()
+
+        self._ask_at_rest(event, job)
+
+    def pause(self, event: object) -> None:
+        """Pause a run, or go on with one that was paused."""
+        if self._bench.running is not None:
+            self._now(event, self._bench.pause)
+        elif self._bench.paused is not None:
+            self._start(event, self._bench.paused)
+
+    def stop(self, event: object) -> None:
+        """Stop a run at once, or give up one that was paused."""
+        self._now(event, self._bench.stop)
+
+    def heard(self, event: object, word: str) -> None:
+        """A row of the table was clicked: go on with that sweep."""
+        joint, _, sweep = word.removeprefix(SWEEP_WORD).partition("-")
+        if word.startswith(SWEEP_WORD) and joint.isdecimal() and sweep.isdecimal():
+            self._ask_at_rest(event, lambda: self._bench.go_to(int(joint), int(sweep)))
 
     def _run(self, event: viser.GuiEvent) -> None:
         asked = self._run_group.value
         if asked == "Stop":
-            self._bench.stop()
-            return
-        self._chosen = None
-        self._ask(event, lambda client: self._bench.run(asked == "Run all"))
+            self.stop(event)
+        elif asked == "Pause":
+            self.pause(event)
+        else:
+            self._start(event, asked == "Run all")
 
-    def _history(self, event: viser.GuiEvent) -> None:
-        asked = self._history_group.value
-        actions = {
-            "Undo": self._bench.undo,
-            "Redo": self._bench.redo,
-            "Skip stop": lambda: self._bench.skip("skipped by the operator"),
-        }
-        self._ask(event, lambda client: actions[asked]())
+    def _start(self, event: object, whole_plan: bool) -> None:
+        self._chosen = None
+
+        def progress(done: int, total: int) -> None:
+            self._done, self._total = done, total
+            self._show_run()
+
+        def job() -> None:
+            self._began, self._done, self._total = time.monotonic(), 0, 0
+            self._bench.run(whole_plan, progress=progress)
+
+        self._ask_at_rest(event, job)
+
+    def _changed_mind(self, event: viser.GuiEvent) -> None:
+        {"Undo": self.undo, "Redo": self.redo, "Skip": self.skip}.get(self._history.value, self.undo)(event)
 
     def _act(self, event: viser.GuiEvent) -> None:
-        asked, number, reason = self._act_group.value, self._number(), self._reason.value
+        asked, number, reason = self._act_group.value, self._number(), self._said()
         if number is None:
             return
         if asked == "Measure again":
             self.measure_again(event)
         elif asked == "Exclude":
-            reason = reason if reason in REASONS else "other"
-            self._ask(event, lambda client: self._bench.exclude(number, reason))
+            self._ask_at_rest(event, lambda: self._bench.exclude(number, reason))
         else:
-            self._ask(event, lambda client: self._bench.include(number))
+            self._ask_at_rest(event, lambda: self._bench.include(number))
+
+    def _ask_at_rest(self, event: object, act: Callable[[], object]) -> None:
+        """Ask for something that cannot be done while the robot runs."""
+        if self._bench.running is not None:
+            self._ask(event, _refuse(RUNNING), at_once=True)
+        else:
+            self._ask(event, lambda client: act())
+
+    def _now(self, event: object, act: Callable[[], None]) -> None:
+        """Do something at once that must not wait for what is in progress."""
+        self._ask(event, lambda client: act(), at_once=True)
+
+    def _said(self) -> str:
+        """The reason, as it is to be kept; what a browser sends is not to be trusted."""
+        if self._reason.value == OWN_WORDS:
+            return " ".join(str(self._words.value).split())[:200]
+        return self._reason.value if self._reason.value in REASONS else ""
 
     def _number(self) -> int | None:
-        shots = self._bench.state.shots
-        return self._chosen if self._chosen is not None else (shots[-1].id if shots else None)
+        if self._chosen is not None:
+            return self._chosen
+        last = self._last()
+        return None if last is None else last.id
 
-    def _show_shot(self, shot: "Shot", chosen: bool) -> None:
-        taken = shot.taken
-        point = "not seen" if taken.point_m is None else ", ".join(f"{v * 1e3:.2f}" for v in taken.point_m) + " mm"
-        reason = f" ({escape(shot.reason)})" if shot.reason else ""
-        which = "chosen" if chosen else "the last one; click a point in 3-D to choose another"
-        self._shot.content = block(
-            f"<p><b>Record {shot.record}</b>, joint {taken.joint}, stop {taken.step + 1}, "
-            f"target {escape(taken.target)}: {which}</p>"
-            f"<p>{point}<br><b>{escape(shot.verdict)}</b>{reason}</p>",
-            "shot",
-        )
+    def _last(self) -> "Shot | None":
+        shots = self._bench.state.shots
+        return shots[-1] if shots else None
+
+    def _last_verdict(self) -> str:
+        last = next((s for s in reversed(self._bench.state.shots) if s.taken.phase == "sweep"), None)
+        if last is None:
+            return verdict_words(None, False, None, None)
+        so_far = self._bench.so_far(last.taken.joint, last.taken.sweep)
+        slides = bool(self._bench.nominal.sliding[last.taken.joint - 1])
+        return verdict_words(so_far, slides, self._bench.tool_std_m(so_far), self._bench.state.instrument.sigma_m)
+
+    def _show_run(self) -> None:
+        spent = time.monotonic() - self._began
+        self._running.content = run_words(self._bench.running, self._bench.paused, self._done, self._total, spent)
+
+
+def _refuse(sentence: str) -> Callable[[object], None]:
+    def job(client: object) -> None:
+        raise InputError(sentence)
+
+    return job
