@@ -4,6 +4,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from app.cell_view import CellView
+from app.compensate_bench import CompensateBench
+from app.panels.compensate import CompensatePanel
 from app.panels.late_tab import LateTab
 from app.panels.verify import VerifyPanel
 from app.pose_bench import PoseBench
@@ -14,10 +16,12 @@ if TYPE_CHECKING:
     import viser
 
 VERIFY_KEY = "V"
+BEFORE = ("Gap", "4 Export")
+"""Tabs that come after these."""
 
 
 class VerifyTabs:
-    """Verify at the left, Poses at the right."""
+    """Verify and Compensate at the left, Poses and Commands at the right."""
 
     def __init__(
         self,
@@ -31,8 +35,12 @@ class VerifyTabs:
         gui, self._cell = server.gui, cell
         self._poses = PoseBench(bench)
         self.verify = VerifyPanel(bench, self._poses, PoseView(server), ask, self._show_shots)
-        self._tab = LateTab(left, "Verify", lambda: self.verify.build(gui), before="4 Export")
+        self._tab = LateTab(left, "Verify", lambda: self.verify.build(gui), before=BEFORE)
         self._plots = LateTab(right, "Poses", lambda: self.verify.build_plots(gui))
+        self._compensated = CompensateBench(self._poses)
+        self.compensate = CompensatePanel(self._compensated, ask, self._refresh_compensation)
+        self._second_tab = LateTab(left, "Compensate", lambda: self.compensate.build(gui), before=BEFORE)
+        self._commands = LateTab(right, "Commands", lambda: self.compensate.build_table(gui))
         gui.add_command("Measure the next test pose", hotkey=VERIFY_KEY).on_trigger(self._measure)
 
     def refresh(self) -> None:
@@ -46,6 +54,7 @@ class VerifyTabs:
             self.verify.refresh()
         elif was:
             self.verify.forget()
+        self._refresh_compensation()
 
     def show_dark(self, dark: bool) -> None:
         """Draw for a dark or a light page."""
@@ -55,6 +64,18 @@ class VerifyTabs:
         """Something of the page was clicked."""
         if self._plots.there:
             self.verify.heard(client, word)
+
+    def _refresh_compensation(self) -> None:
+        there = self._poses.arm is not None
+        if not there:
+            self._compensated.forget()
+        self._second_tab.show(there)
+        table = self._compensated.last is not None
+        if self._commands.there and not table:
+            self.compensate.forget_table()
+        self._commands.show(table)
+        if there:
+            self.compensate.refresh()
 
     def _show_shots(self, shown: bool) -> None:
         self._cell.points.visible = shown

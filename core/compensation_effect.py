@@ -25,6 +25,16 @@ class Misses:
     rotation_rad: Array
     """(m,)"""
 
+    @property
+    def mean_position_m(self) -> float:
+        """Over the poses that have a command; NaN without any."""
+        return _mean(self.position_m)
+
+    @property
+    def mean_rotation_rad(self) -> float:
+        """The same of rotations."""
+        return _mean(self.rotation_rad)
+
 
 @dataclass(frozen=True)
 class CompensationEffect:
@@ -32,6 +42,8 @@ class CompensationEffect:
 
     nominal_commanded: Array
     """The commands of the nominal arm for the wanted poses, rad or m, (m, n); NaN where it cannot take one."""
+    reached: Array
+    """Where the compensated commands bring the tool, in the frame of the wanted poses, (m, 4, 4); NaN without one."""
     nominal: Misses
     compensated: Misses
 
@@ -54,10 +66,12 @@ def compensation_effect(
     limit = Tolerance() if tolerance is None else tolerance
     beyond = (missed.position_m > limit.position_m) | (missed.rotation_rad > limit.rotation_rad)
     commanded[beyond] = np.nan
+    there = _reached(arm, found.commanded)
     return CompensationEffect(
         nominal_commanded=commanded,
+        reached=arm.base @ there if frame == "instrument" else there,
         nominal=_misses(_reached(arm, commanded), wanted),
-        compensated=_misses(_reached(arm, found.commanded), wanted),
+        compensated=_misses(there, wanted),
     )
 
 
@@ -76,3 +90,8 @@ def _misses(there: Array, wanted: Array) -> Misses:
     turns = vectors_of_rotations(there[known, :3, :3] @ np.swapaxes(wanted[known, :3, :3], 1, 2))
     rotation[known] = np.linalg.norm(turns, axis=1)
     return Misses(position, rotation)
+
+
+def _mean(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else np.nan

@@ -138,6 +138,29 @@ def poses_csv(table: PoseTable, robot: Robot, poses: Array, commanded: Array, st
     return out.getvalue()
 
 
+def wanted_csv(names: Sequence[str], robot: Robot, poses: Array, near: Array) -> str:
+    """Wanted poses in mm with quaternions, and the joint values near which the arm is to take them.
+
+    Args:
+        names: what each pose is called.
+        robot: tells which joints have a command, and their units.
+        poses: from the tool to the frame in which they are given, (m, 4, 4), m.
+        near: commands, (m, n), rad or m.
+    """
+    motors = np.flatnonzero(robot.commanded)
+    units = [displacement_units(robot.joints[i].slides)[0] for i in motors]
+    header = ["pose", *(f"{base}_mm" for base in POINT), *QUATERNION]
+    header += [f"q{i + 1}_{unit}" for i, unit in zip(motors, units, strict=True)]
+    columns = [from_si(poses[:, k, 3], "mm") for k in range(3)] + list(quaternions(poses[:, :3, :3]).T)
+    columns += [from_si(near[:, i], unit) for i, unit in zip(motors, units, strict=True)]
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(header)
+    for name, row in zip(names, np.stack(columns, axis=1).tolist(), strict=True):
+        writer.writerow([name, *(f"{value + 0.0:.12g}" for value in row)])
+    return out.getvalue()
+
+
 def _written(table: PoseTable, rotations: Array, given: np.ndarray) -> list[Array]:
     """Columns of orientations as the table has them; of two quaternions the one nearer to what was asked for."""
     if table.quaternion is None:

@@ -15,7 +15,7 @@ class LateTab:
         group: "viser.GuiTabGroupHandle | viser.PanelHandle",
         label: str,
         build: Callable[[], None],
-        before: str | None = None,
+        before: str | tuple[str, ...] = (),
     ) -> None:
         """Nothing is shown yet.
 
@@ -23,9 +23,10 @@ class LateTab:
             group: the row of tabs.
             label: of this one.
             build: fills it, within its context.
-            before: label of the tab that it comes before; None: at the end.
+            before: labels of tabs that it comes before, the first of them that is there; none: at the end.
         """
-        self._group, self._label, self._build, self._before = group, label, build, before
+        self._group, self._label, self._build = group, label, build
+        self._before = (before,) if isinstance(before, str) else before
         self._tab: viser.GuiTabHandle | None = None
 
     @property
@@ -47,6 +48,7 @@ class LateTab:
         # viser adds tabs at the end only; the order of its own list is what browsers are told.
         handles = self._group._tab_handles
         labels = [handle._label for handle in handles]
-        if self._before in labels:
-            handles.insert(labels.index(self._before), handles.pop())
+        place = next((labels.index(label) for label in self._before if label in labels), None)
+        if place is not None:
+            handles.insert(place, handles.pop())
             self._group._rebuild_tab_props()

@@ -1,6 +1,7 @@
 """Verifying the demo cell's arm in a real browser: command, measure, compare, before compensation and after it."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -176,3 +177,42 @@ def test_a_new_session_takes_the_tab_away(page, dashboard):
     page.get_by_role("tab", name="Verify").wait_for(state="detached")
     page.get_by_role("tab", name="Poses").wait_for(state="detached")
     assert dashboard.bench.calibration is None
+
+
+def test_poses_are_compensated_from_the_example_to_the_file(page, dashboard):
+    solve(page)
+    assert page.get_by_role("tab", name="Commands").count() == 0
+    tab(page, "Compensate")
+    press(page, "Compensate")
+    page.get_by_role("alert").filter(has_text="No poses are pasted").wait_for()
+    press(page, "Fill in test poses")
+    page.wait_for_function(
+        "() => [...document.querySelectorAll('textarea')].some(t => t.value.startsWith('pose,x_mm'))"
+    )
+    page.wait_for_timeout(200)
+    press(page, "Compensate")
+    wait_for_text(page, "compensated-count", "12 of 12 poses")
+    tab(page, "Commands")
+    last = dashboard.verify._compensated.last
+    rows = page.locator("[data-testid=compensated-table] table").first.locator("tr").all()
+    assert len(rows) == 13
+    cells = rows[5].locator("td").all_inner_texts()
+    assert float(cells[4]) == pytest.approx(np.rad2deg(last.found.commanded[4, 0]), abs=6e-4)
+    with page.expect_download() as waiting:
+        press(page, "Commands (CSV)")
+    sent = waiting.value
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d_\d{6}_trueaxis_commands\.csv", sent.suggested_filename)
+    assert Path(sent.path()).read_text(encoding="utf-8") == last.csv
+
+
+def test_a_file_of_poses_is_sent_and_a_wrong_one_is_named(page, dashboard, tmp_path):
+    solve(page)
+    tab(page, "Compensate")
+    good, wrong = tmp_path / "poses.csv", tmp_path / "<b>wrong.csv"
+    good.write_text(dashboard.verify._compensated.test_poses_csv(), encoding="utf-8")
+    wrong.write_text("x_mm,y_mm,z_mm\n1,2,3\n", encoding="utf-8")
+    chooser = page.locator("input[type=file][id^=file_upload_]").first
+    chooser.set_input_files(wrong)
+    page.get_by_role("alert").filter(has_text="no orientation, expected columns qw").wait_for()
+    chooser.set_input_files(good)
+    wait_for_text(page, "compensated-count", "12 of 12 poses")

@@ -28,6 +28,7 @@ def test_without_compensation_the_calibrated_arm_ends_where_nominal_commands_bri
     assert effect.nominal.position_m.mean() > 0.03
     assert effect.compensated.position_m.max() < 1e-8
     assert effect.compensated.rotation_rad.max() < 1e-8
+    np.testing.assert_allclose(effect.reached, poses, rtol=0, atol=1e-8)
 
 
 def test_the_instrument_s_frame_changes_nothing() -> None:
@@ -37,6 +38,7 @@ def test_the_instrument_s_frame_changes_nothing() -> None:
     seen = ready.base @ poses
     there = compensation_effect(ready, seen, compensate(ready, seen, q, "instrument"), q, "instrument")
     np.testing.assert_allclose(there.nominal.position_m, here.nominal.position_m, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(there.reached, seen, rtol=0, atol=1e-8)
 
 
 def test_poses_that_cannot_be_had_have_no_numbers() -> None:
