@@ -67,12 +67,11 @@ def new_poses(robot: Robot, plan: Plan, count: int, seed: int) -> tuple[tuple[fl
         raise InputError(f"{count} poses, expected 1 to {MOST_POSES}")
     if not plan.sweeps:
         raise InputError("no sweep is planned, expected some that say how far each joint may move")
-    low, high = np.zeros(robot.joint_count), np.zeros(robot.joint_count)
-    for row in plan.sweeps:
-        low[row.joint - 1], high[row.joint - 1] = min(low[row.joint - 1], row.low), max(high[row.joint - 1], row.high)
-    home = np.zeros(robot.joint_count) if plan.home is None else np.array(plan.home)
-    moved = np.random.default_rng(seed).uniform(SHARE * low, SHARE * high, (count, robot.joint_count))
-    commanded = commands_for(robot, active_commands(robot, home) + moved)
+    home = active_commands(robot, np.zeros(robot.joint_count) if plan.home is None else np.array(plan.home))
+    low, high = _swept_ranges(robot, plan, home[0])
+    middle, half = (low + high) / 2, SHARE * (high - low) / 2
+    moved = np.random.default_rng(seed).uniform(middle - half, middle + half, (count, robot.joint_count))
+    commanded = commands_for(robot, home + moved)
     # Joints that follow one another may leave their limits together where none does alone.
     limits = np.array([joint.limits for joint in robot.joints])
     return tuple(tuple(row) for row in np.clip(commanded, limits[:, 0], limits[:, 1]).tolist())
@@ -88,3 +87,16 @@ def _check_limits(robot: Robot, number: int, commanded: Array) -> None:
                 f"pose {number} commands joint {i + 1} to {there:.6g} {unit}, beyond its limits {low:.6g} to "
                 f"{high:.6g} {unit}"
             )
+
+
+def _swept_ranges(robot: Robot, plan: Plan, home: Array) -> tuple[Array, Array]:
+    """How far from home the sweeps bring each motor at least and at most, (n,) each; without one it stays as held."""
+    held = [home if row.held is None else active_commands(robot, np.array(row.held))[0] for row in plan.sweeps]
+    ranges: dict[int, list[float]] = {}
+    for row, still in zip(plan.sweeps, held, strict=True):
+        k = row.joint - 1
+        ranges.setdefault(k, []).extend(float(still[k] - home[k]) + end for end in (row.low, row.high))
+    rest = held[0] - home
+    ends = [(min(ranges[k]), max(ranges[k])) if k in ranges else (rest[k], rest[k]) for k in range(robot.joint_count)]
+    low, high = np.array(ends).T
+    return low, high

@@ -34,7 +34,7 @@ SESSIONS = """
     core.session_poses
     core.session_events core.suggested_plan
     core.session_entries core.session_import core.session_shots core.session_state
-    core.session_conditions core.entered_shots core.session_live core.session_families
+    core.session_conditions core.entered_shots core.session_live core.session_families core.cell_setup
     core.session_lock core.session_store core.session_checks core.session_fold core.session_reader
     core.session_timeline core.session core.session_library core.session_campaign
     core.session_archive core.import_tray
