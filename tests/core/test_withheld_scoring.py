@@ -192,6 +192,14 @@ def test_refusals_and_crashes_are_told_apart(tmp_path: Path) -> None:
     assert not refused.crashed
 
 
+def test_another_day_that_fails_does_not_lose_the_verdict(tmp_path: Path) -> None:
+    run("make", "dev", tmp_path, limit=1, processes=1)
+    folder = asking.campaigns(tmp_path)[0]
+    verdict = ask(Product(says_no_gap, json.dumps, lambda report, fresh: {}["nothing"]), folder, folder)
+    assert verdict.gap == says_no_gap(None)
+    assert "KeyError" in verdict.not_realised
+
+
 def test_the_same_case_is_made_twice_alike(tmp_path: Path) -> None:
     for day in ("one", "two"):
         run("make", "dev", tmp_path / day, only="mixture", limit=1, processes=1)

@@ -56,7 +56,7 @@ def run(
 
 
 def score(out: Path, seeds: str) -> str:
-    """Table, effects one by one, failures."""
+    """Table, effects one by one, failures; also kept as score.md."""
     outcomes = read_outcomes(out)
     parts = [
         f"Withheld suite, {seeds} seeds, {len(outcomes)} campaigns.",
@@ -66,4 +66,6 @@ def score(out: Path, seeds: str) -> str:
         "Failures:",
         failures(outcomes),
     ]
-    return "\n\n".join(parts)
+    text = "\n\n".join(parts)
+    (out / "score.md").write_text(text + "\n")
+    return text

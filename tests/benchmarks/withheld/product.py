@@ -55,6 +55,8 @@ class Verdict:
     """Last lines of what went wrong, if it did."""
     realised: float | None = None
     """Closure on another day at the same arm."""
+    not_realised: str = ""
+    """Why there is none though there is another day."""
 
     def write(self, path: Path) -> None:
         path.write_text(json.dumps(asdict(self), indent=1))
@@ -71,10 +73,22 @@ def ask(product: Product, folder: Path, fresh: Path | None = None, **how: object
         report = product.diagnose(read_campaign(folder), **how)
         seconds = time.perf_counter() - begun
         gap = json.loads(product.to_json(report))
-        realised = float(product.realised(report, read_campaign(fresh))) if fresh is not None else None
     except TrueaxisError as refusal:
         return Verdict(None, time.perf_counter() - begun, refused=str(refusal))
     except Exception:
         # A crash is a result of its own: it is counted and listed, and the others go on.
-        return Verdict(None, time.perf_counter() - begun, crashed=traceback.format_exc()[-800:])
-    return Verdict(gap, seconds, realised=realised)
+        return Verdict(None, time.perf_counter() - begun, crashed=_last_lines())
+    return Verdict(gap, seconds, **_another_day(product, report, fresh))
+
+
+def _another_day(product: Product, report: object, fresh: Path | None) -> Json:
+    if fresh is None:
+        return {}
+    try:
+        return {"realised": float(product.realised(report, read_campaign(fresh)))}
+    except Exception:
+        return {"not_realised": _last_lines()}
+
+
+def _last_lines() -> str:
+    return traceback.format_exc()[-800:]

@@ -145,6 +145,8 @@ def _shrink_rows(outcomes: list[Outcome]) -> Iterator[Row]:
     missed = [o.promise_missed_by for o in outcomes if o.promise_missed_by is not None]
     kept = float(np.mean(np.abs(missed) <= PROMISE)) if missed else float("nan")
     yield Row(f"promised closure within {PROMISE:g} of that on another day", kept, len(missed), at_least=0.90)
+    another = [o for o in outcomes if o.verdict.realised is not None or o.verdict.not_realised]
+    yield _share("another day could not be predicted", another, lambda o: bool(o.verdict.not_realised), at_most=0.0)
 
 
 def _physics_rows(outcomes: list[Outcome]) -> Iterator[Row]:

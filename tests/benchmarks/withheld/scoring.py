@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.benchmarks.withheld.asking import campaigns, read_verdicts
-from tests.benchmarks.withheld.matching import UNKNOWN, is_right, members, number, right_in_class, right_place
+from tests.benchmarks.withheld.matching import UNKNOWN, is_right, members, right_in_class, right_place
 from tests.benchmarks.withheld.product import Json, Verdict
 
 SURE = 0.5
@@ -74,8 +74,8 @@ class Outcome:
 
     @property
     def has_place(self) -> bool:
-        """Whether the (first) truth sits at a joint, link or frame."""
-        return number(self.answers[0]) is not None
+        """Whether the (first) truth sits at a joint or link; a frame lies between two."""
+        return bool({"joint", "to"} & set(self.answers[0]))
 
     @property
     def claims(self) -> bool:
@@ -97,21 +97,19 @@ class Outcome:
     @property
     def against_oracle(self) -> float | None:
         """Share closed on kept-out points over that of an oracle that was told the cause."""
-        if self.oracle is None or self.oracle.gap is None:
+        possible = closed_square(self.oracle) if self.oracle else None
+        if possible is None or possible <= 0.0:
             return None
-        possible = closed_square(self.oracle.gap)
-        if possible <= 0.0:
-            return None
-        return closed_square(self.verdict.gap) / possible if self.verdict.gap else 0.0
+        return (closed_square(self.verdict) or 0.0) / possible
 
     @property
     def promise_missed_by(self) -> float | None:
         """Promised less realised closure on another day; None where nothing was promised or measured."""
-        gap, realised = self.verdict.gap, self.verdict.realised
-        if gap is None or realised is None or not self.causes:
+        closed, realised = closed_square(self.verdict), self.verdict.realised
+        if closed is None or realised is None or not self.causes:
             return None
-        before = float(gap["gap_rms_mm"]) ** 2 - float(gap["floor_rms_mm"]) ** 2
-        return closed_square(gap) / before - realised if before > 0 else None
+        gap, floor = self.verdict.gap["gap_rms_mm"], self.verdict.gap["floor_rms_mm"]
+        return closed / (gap**2 - floor**2) - realised if floor is not None and gap > floor else None
 
     @property
     def noticed_without(self) -> bool:
@@ -133,9 +131,11 @@ def probability(cause: Json) -> float:
     return float(cause.get("probability") or 0.0)
 
 
-def closed_square(gap: Json) -> float:
-    """gap^2 - left^2 on kept-out points, mm^2."""
-    return float(gap["gap_rms_mm"]) ** 2 - float(gap["left_rms_mm"]) ** 2
+def closed_square(verdict: Verdict) -> float | None:
+    """gap^2 - left^2 on kept-out points, mm^2; None where one of them is not known."""
+    if verdict.gap is None or verdict.gap["gap_rms_mm"] is None or verdict.gap["left_rms_mm"] is None:
+        return None
+    return float(verdict.gap["gap_rms_mm"]) ** 2 - float(verdict.gap["left_rms_mm"]) ** 2
 
 
 def read_outcomes(folder: Path) -> list[Outcome]:
