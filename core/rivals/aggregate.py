@@ -25,7 +25,7 @@ from core.rivals.equations import Equations
 MOST_ITERATIONS = 50
 SETTLED = 1e-11
 """Largest change of any parameter, rad or m, at which the linear iteration ends."""
-MOST_EVALUATIONS = 400
+MOST_EVALUATIONS = 200
 """Of the Levenberg-Marquardt method."""
 
 

@@ -30,7 +30,7 @@ class Drives(StrEnum):
     AS_COMMANDED = "as commanded"
     """Every motor does what it is told, couplings have their nominal gains: geometry and zeros are all that is fitted,
     as in most of the literature."""
-    FUNCTIONS = "functions"
+    FUNCTIONS = "with functions"
     """With the robot's transmission and coupling functions, whose constants are fitted too."""
 
 
@@ -83,10 +83,13 @@ def observed_points(campaign: Campaign, repeatability_m: float = 0.0) -> Observe
 def nominal_base(points: ObservedPoints) -> Array:
     """Where the nominal arm's base stands if its points are to lie where they were seen, (4, 4): a rigid fit.
 
-    A target whose place is not stated is taken to sit in the origin of its link's frame.
+    Targets whose place is stated decide; if there are none, all do, as if they sat in the origins of their links.
     """
-    stated = np.nan_to_num(_stated_places(points))
-    return rigid_fit(apply(_nominal_links(points), stated[points.seen.target]), points.seen.point_m)
+    stated = _stated_places(points)[points.seen.target]
+    known = np.isfinite(stated).all(axis=1)
+    if known.sum() < FEWEST_POINTS:
+        stated, known = np.nan_to_num(stated), np.ones(len(known), dtype=bool)
+    return rigid_fit(apply(_nominal_links(points)[known], stated[known]), points.seen.point_m[known])
 
 
 def nominal_state(points: ObservedPoints, base: Array, drives: Drives) -> ArmState:
