@@ -47,7 +47,7 @@ class Dashboard:
         Raises:
             InputError: the address cannot be used.
         """
-        self.bench, self.jobs = bench, Jobs()
+        self.bench, self.jobs = bench, Jobs(idle=bench.solve_ahead)
         self.server = _server(host, port)
         self.host, self.port = host, self.server.get_port()
         self.server.gui.configure_theme(**THEME)

@@ -4,6 +4,7 @@ Callbacks of the web server run on many threads at once and in no order. Everyth
 goes through here, one after the other, so that nothing is done twice and the page never freezes.
 """
 
+import contextlib
 import logging
 import queue
 import threading
@@ -13,12 +14,16 @@ from core.errors import TrueaxisError
 
 LOG = logging.getLogger("trueaxis")
 Report = Callable[[str], None]
+REST_S = 0.3
+"""How long nothing must have been asked before the worker thinks ahead."""
 
 
 class Jobs:
     """A queue of jobs with one worker thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, idle: Callable[[], None] = lambda: None) -> None:
+        """``idle`` is done by the worker when nothing was asked for a while after the last job."""
+        self._idle = idle
         self._queue: queue.Queue[tuple[Callable[[], None], Report] | None] = queue.Queue()
         self._busy = threading.Event()
         self._worker = threading.Thread(target=self._work, daemon=True, name="trueaxis-jobs")
@@ -53,7 +58,7 @@ class Jobs:
         self._worker.join(timeout=10)
 
     def _work(self) -> None:
-        while (item := self._queue.get()) is not None:
+        while (item := self._next()) is not None:
             job, report = item
             self._busy.set()
             try:
@@ -62,6 +67,16 @@ class Jobs:
                 self._busy.clear()
                 self._queue.task_done()
         self._queue.task_done()
+
+    def _next(self) -> tuple[Callable[[], None], Report] | None:
+        """What was asked next; while nothing is, the worker thinks ahead once."""
+        with contextlib.suppress(queue.Empty):
+            return self._queue.get(timeout=REST_S)
+        try:
+            self._idle()
+        except Exception:
+            LOG.exception("thinking ahead failed")
+        return self._queue.get()
 
 
 def _do(job: Callable[[], None], report: Report) -> None:

@@ -4,6 +4,7 @@ Nothing here draws. Everything that an operator decides or an instrument sees go
 told after it is on the disk. Any thread may call; one measurement runs at a time.
 """
 
+import contextlib
 import hashlib
 import threading
 from collections.abc import Callable
@@ -12,13 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
+from app.ahead import SolveAhead
 from app.rigs import key_of, rig_for
 from core.base_placement import Placement
 from core.by_hand import EnteredPoints
-from core.calibration import Calibration, calibrate
+from core.calibration import Calibration
 from core.calibration_json import calibration_to_json
 from core.entered_shots import shots_of_file, shots_of_lines
-from core.errors import InputError
+from core.errors import InputError, TrueaxisError
 from core.geometry import Array
 from core.instruments import Desk, MeasurementCancelled, MeasureRequest, Reading, RobotDriver
 from core.kinematics import nominal_net
@@ -82,6 +84,7 @@ class Workbench:
         self._set_up()
         self.calibration: Calibration | None = None
         self.previous: Calibration | None = None
+        self._ahead = SolveAhead()
         self._listeners: list[Callable[[], None]] = []
         self._one_shot = threading.Lock()
         self._stop = threading.Event()
@@ -333,9 +336,7 @@ class Workbench:
         Raises:
             TrueaxisError: the shots do not allow it; the sentence says why.
         """
-        state = self.state
-        campaign = to_campaign(state)
-        found = calibrate(campaign)
+        found = self._ahead.solution(to_campaign(self.state))
         digest = hashlib.sha256(calibration_to_json(found).encode()).hexdigest()
         self.session.append(Solved(digest, len(found.refinement.residuals.row), VERSION, figures_of(found)), by)
         self.previous, self.calibration = self.calibration, found
@@ -349,8 +350,13 @@ class Workbench:
             TrueaxisError: it cannot be computed any more.
         """
         if self.state.solves and self.calibration is None and not self.since_solved:
-            self.calibration = calibrate(to_campaign(self.state))
+            self.calibration = self._ahead.solution(to_campaign(self.state))
             self.changed()
+
+    def solve_ahead(self) -> None:
+        """Compute the solution of what is there, so that it is at hand when it is asked for; nothing is decided."""
+        with contextlib.suppress(TrueaxisError):
+            self._ahead.prepare(to_campaign(self.state))
 
     @property
     def since_solved(self) -> int:

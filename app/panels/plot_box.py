@@ -32,7 +32,8 @@ class PlotBox:
     def show(self, figure: go.Figure, caption: str = "") -> None:
         """Draw a figure."""
         self._figure = figure
-        self._plot.figure = in_theme(figure, self._dark)
+        # Figures are made for a light page.
+        self._plot.figure = in_theme(figure, dark=True) if self._dark else figure
         self._plot.aspect = figure.layout.height / WIDTH_PX
         self._plot.visible = True
         self._say(f"<p class='soft'>{escape(caption)}</p>" if caption else "")
@@ -44,6 +45,8 @@ class PlotBox:
 
     def show_dark(self, dark: bool) -> None:
         """Draw for a dark or a light page."""
+        if dark == self._dark:
+            return
         self._dark = dark
         if self._plot.visible:
             self._plot.figure = in_theme(self._figure, dark)

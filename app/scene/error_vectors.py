@@ -49,6 +49,7 @@ class ErrorVectors(SceneGroup):
         self._measured, self._predicted = np.zeros((0, 3)), np.zeros((0, 3))
         self._label_m = np.zeros(3)
         self._drawn: list[viser.SceneNodeHandle] = []
+        self._fresh = True
 
     def show(self, measured_m: ArrayLike, predicted_m: ArrayLike, label_m: ArrayLike | None = None) -> None:
         """Draw the errors of points, (m, 3) each; the factor is written at ``label_m``, else above the points."""
@@ -65,7 +66,21 @@ class ErrorVectors(SceneGroup):
         self._magnification = factor
         self._draw()
 
+    @property
+    def visible(self) -> bool:
+        return self._top.visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        self._top.visible = visible
+        if visible and not self._fresh:
+            self._draw()
+
     def _draw(self) -> None:
+        """Draw if anybody sees it; else when it is shown."""
+        self._fresh = self._top.visible
+        if not self._fresh:
+            return
         solid = arrows(magnified_ends(self._measured, self._predicted, self._magnification))
         with self._together():
             if len(solid.faces) == 0:

@@ -54,3 +54,35 @@ def test_busy_while_something_is_done(jobs):
     go.set()
     jobs.wait()
     assert not jobs.busy
+
+
+def test_the_worker_thinks_ahead_once_after_a_rest(monkeypatch):
+    monkeypatch.setattr("app.jobs.REST_S", 0.02)
+    thought = threading.Semaphore(0)
+    worker = Jobs(idle=thought.release)
+    try:
+        assert thought.acquire(timeout=5)
+        assert not thought.acquire(timeout=0.2)
+        worker.ask(lambda: None, lambda _: None)
+        assert thought.acquire(timeout=5)
+    finally:
+        worker.close()
+
+
+def test_what_goes_wrong_in_thinking_ahead_stops_nothing(monkeypatch, caplog):
+    monkeypatch.setattr("app.jobs.REST_S", 0.02)
+    tried, done = threading.Event(), []
+
+    def wrong():
+        tried.set()
+        raise ZeroDivisionError
+
+    worker = Jobs(idle=wrong)
+    try:
+        assert tried.wait(5)
+        worker.ask(lambda: done.append(1), done.append)
+        worker.wait()
+    finally:
+        worker.close()
+    assert done == [1]
+    assert "ZeroDivisionError" in caplog.text
