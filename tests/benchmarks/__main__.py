@@ -1,4 +1,4 @@
-"""``python -m tests.benchmarks axes|speed|poses|dashboard``: a table in Markdown, the same but for times."""
+"""``python -m tests.benchmarks WHAT``: a table in Markdown, the same numbers every time but for times."""
 
 import os
 
@@ -17,9 +17,10 @@ def main() -> None:
 
         return withheld(sys.argv[2:])
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
-    parser.add_argument("what", choices=("axes", "speed", "poses", "dashboard"))
+    parser.add_argument("what", choices=("axes", "speed", "poses", "planning", "dashboard"))
     parser.add_argument("--sweeps", type=int, default=4000, help="simulated sweeps for each row of 'axes'")
     parser.add_argument("--poses", type=int, default=100_000, help="random poses for 'poses'")
+    parser.add_argument("--seeds", type=int, default=100, help="simulated campaigns for each plan of 'planning'")
     asked = parser.parse_args()
     if asked.what == "axes":
         from tests.benchmarks.axis_efficiency import table
@@ -29,6 +30,10 @@ def main() -> None:
         from tests.benchmarks.compensation_speed import report as of_poses
 
         print(of_poses(asked.poses))
+    elif asked.what == "planning":
+        from tests.benchmarks.planning import report as of_planning
+
+        print(of_planning(asked.seeds))
     elif asked.what == "dashboard":
         from tests.benchmarks.dashboard import report as of_dashboard
 
