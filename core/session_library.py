@@ -10,6 +10,7 @@ from core.session_entries import new_entry
 from core.session_events import Copied, SessionError
 from core.session_lock import writer_of
 from core.session_reader import read_contents
+from core.session_state import State
 from core.session_store import SUFFIX, copy_file, write_new
 from core.session_timeline import Timeline
 
@@ -33,19 +34,53 @@ class SessionSummary:
     """Why it cannot be opened, or what of it is not intact; empty: nothing is wrong."""
 
 
+class Shelf:
+    """The sessions in a folder, each file read anew only when it has changed."""
+
+    def __init__(self, folder: Path | str) -> None:
+        self.folder = Path(folder)
+        self._known: dict[Path, tuple[tuple, SessionSummary]] = {}
+
+    def summaries(self, words: str = "", own: tuple[Path, State] | None = None) -> tuple[SessionSummary, ...]:
+        """The sessions that hold all these words, the last changed one first; damaged ones too, and what is wrong.
+
+        Args:
+            words: to be found in title, names, facts or notes, in any case; empty: all sessions.
+            own: path and state of a session that is open here, and so need not be read.
+
+        Raises:
+            SessionError: the folder is missing or cannot be read.
+        """
+        found = [
+            summary_of(*own) if own is not None and path == own[0] else self._summary(path) for path in self._paths()
+        ]
+        asked = words.casefold().split()
+        wanted = [one for one in found if all(word in "\n".join(one.texts) for word in asked)]
+        return tuple(sorted(wanted, key=lambda summary: summary.changed_utc, reverse=True))
+
+    def _paths(self) -> list[Path]:
+        try:
+            return sorted(p for p in self.folder.iterdir() if p.name.endswith(SUFFIX) and p.name[0] != ".")
+        except OSError as wrong:
+            raise SessionError(
+                f"{self.folder} cannot be listed: {wrong.strerror}, expected a folder of sessions"
+            ) from None
+
+    def _summary(self, path: Path) -> SessionSummary:
+        key = tuple(_stamp(path.with_name(path.name + suffix)) for suffix in ("", "-wal", ".lock"))
+        known = self._known.get(path)
+        if known is None or known[0] != key:
+            self._known[path] = known = key, _read_summary(path)
+        return known[1]
+
+
 def list_sessions(folder: Path | str) -> tuple[SessionSummary, ...]:
     """The sessions in a folder, the last changed one first; damaged ones too, with what is wrong with them.
 
     Raises:
         SessionError: the folder is missing or cannot be read.
     """
-    folder = Path(folder)
-    try:
-        paths = sorted(path for path in folder.iterdir() if path.name.endswith(SUFFIX) and path.name[0] != ".")
-    except OSError as wrong:
-        raise SessionError(f"{folder} cannot be listed: {wrong.strerror}, expected a folder of sessions") from None
-    found = [_summary(path) for path in paths]
-    return tuple(sorted(found, key=lambda summary: summary.changed_utc, reverse=True))
+    return Shelf(folder).summaries()
 
 
 def search(folder: Path | str, words: str) -> tuple[SessionSummary, ...]:
@@ -54,10 +89,7 @@ def search(folder: Path | str, words: str) -> tuple[SessionSummary, ...]:
     Raises:
         SessionError: as for ``list_sessions``.
     """
-    asked = words.casefold().split()
-    return tuple(
-        summary for summary in list_sessions(folder) if all(word in "\n".join(summary.texts) for word in asked)
-    )
+    return Shelf(folder).summaries(words)
 
 
 def copy_session(source: Path | str, path: Path | str) -> None:
@@ -98,12 +130,8 @@ def free_path(folder: Path | str, title: str) -> Path:
         number += 1
 
 
-def _summary(path: Path) -> SessionSummary:
-    try:
-        contents = read_contents(path, writer_of(path) is not None)
-    except InputError as wrong:
-        return SessionSummary(path, title=path.name, texts=(path.name.casefold(),), problem=str(wrong))
-    state = Timeline(contents.entries, contents.warnings).state
+def summary_of(path: Path, state: State) -> SessionSummary:
+    """What a list shows of a session in this state."""
     try:
         robot = state.robot.name if state.robot is not None else ""
     except InputError:
@@ -124,6 +152,23 @@ def _summary(path: Path) -> SessionSummary:
         texts=tuple(text.casefold() for text in texts),
         problem="; ".join(state.warnings),
     )
+
+
+def _read_summary(path: Path) -> SessionSummary:
+    try:
+        contents = read_contents(path, writer_of(path) is not None)
+    except InputError as wrong:
+        return SessionSummary(path, title=path.name, texts=(path.name.casefold(),), problem=str(wrong))
+    return summary_of(path, Timeline(contents.entries, contents.warnings).state)
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """Size and time of change of a file; zeros where there is none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return 0, 0
+    return status.st_size, status.st_mtime_ns
 
 
 def _one_line(name: str) -> str:

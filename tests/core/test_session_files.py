@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from session_scenes import busy_session, demo_session, take
 
-from core import session_entries, session_reader, session_store
+from core import session_entries, session_library, session_reader, session_store
 from core.errors import InputError
 from core.instruments import Reading
 from core.session import Session
@@ -362,3 +362,25 @@ def test_sessions_are_listed_and_searched(tmp_path: Path) -> None:
     assert found("sn-b") == ["b"]
     assert found("brok") == ["broken"]
     assert found("nobody") == []
+
+
+def test_a_shelf_reads_a_file_again_only_when_it_has_changed(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read = []
+
+    def counted(one: Path, in_use: bool = False):
+        read.append(one.name)
+        return session_reader.read_contents(one, in_use)
+
+    monkeypatch.setattr(session_library, "read_contents", counted)
+    copy_session(path, path.with_name("b.trueaxis"))
+    shelf, read[:] = session_library.Shelf(path.parent), []
+    assert [one.path.name for one in shelf.summaries()] == [one.path.name for one in shelf.summaries()]
+    assert sorted(read) == ["a.trueaxis", "b.trueaxis"]
+    with Session.open(path) as session:
+        session.append(Titled("found again"))
+        assert [one.title for one in shelf.summaries("found")] == ["found again"]
+        assert sorted(read) == ["a.trueaxis", "a.trueaxis", "b.trueaxis"]
+        session.append(Titled("as it is now"))
+        own = shelf.summaries("as it is now", (path, session.state))
+        assert [one.title for one in own] == ["as it is now"]
+    assert sorted(read) == ["a.trueaxis", "a.trueaxis", "b.trueaxis"]
