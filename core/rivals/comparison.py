@@ -228,7 +228,12 @@ def compare(
     rows = tuple(
         _row(method, each, count) for method, each, count in zip(methods, outcomes, counts, strict=True) if any(each)
     )
-    return Comparison(title, len(trials), poses, rows, references, notes)
+    lost = tuple(
+        f"{method.name}, drives {method.drives}: found no arm in any trial."
+        for method, each in zip(methods, outcomes, strict=True)
+        if not any(each)
+    )
+    return Comparison(title, len(trials), poses, rows, references, (*notes, *lost))
 
 
 def _judged(method: Method, trial: Trial) -> _Outcome | None:

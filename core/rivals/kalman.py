@@ -21,13 +21,13 @@ from core.arm_jacobian import ArmState
 from core.errors import NotConverged
 from core.estimate import axis_basis
 from core.geometry import Array, Line, cross, rotation_about
-from core.rivals.aggregate import MOST_ITERATIONS, covariance_of, solved
+from core.rivals.aggregate import MOST_ITERATIONS, SETTLED, covariance_of, solved
 from core.rivals.equations import Equations
 
 MOST_REPEATS = 5
 """Of one update."""
-SETTLED = 1e-9
-"""Change of the deviations, in units of the prior, at which an update is not repeated."""
+WORTHWHILE = 1e-6
+"""An update is repeated while it changes the deviations by more than this, in units of what was known before."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def _together(first: Equations, start: ArmState, prior: Array) -> tuple[ArmState
         whole = np.concatenate([found.jacobian, pull])
         step = solved(whole, np.concatenate([found.residual, -pull @ deviation]))
         state, deviation = first.moved(state, step), deviation + step
-        if np.abs(step / scale).max() < SETTLED:
+        if np.abs(step).max() < SETTLED:
             return state, covariance_of(whole)
     raise NotConverged(f"the first {first.count} standstills of the filter were not solved in {MOST_ITERATIONS} steps")
 
@@ -141,7 +141,7 @@ def _updated(one: Equations, prior_state: ArmState, prior: Array) -> tuple[ArmSt
         change = np.abs((better - deviation) / scale).max()
         deviation = better
         state = one.moved(prior_state, deviation)
-        if change < SETTLED:
+        if change < WORTHWHILE:
             break
     # Joseph's form stays symmetric and positive whatever is rounded.
     keep = np.eye(one.size) - gain @ found.jacobian

@@ -89,10 +89,10 @@ def test_the_covariance_is_consistent(warm_up):
     The test of Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation (Wiley 2001),
     section 5.4. The prior is that of an arm that was calibrated before, so that the model is linear within it.
     """
-    own, runs = cell("irb_l6", True), 80
+    own, runs = cell("irb_l6", True), 60
     squares, innovations, freedom = [], [], 0
     for seed in range(runs):
-        found = problem("points", Drives.AS_COMMANDED, Noise(), seed, 40)
+        found = problem("points", Drives.AS_COMMANDED, Noise(), seed, 30)
         equations, rng = found.equations, np.random.default_rng((seed, 5))
         spread = Prior(5e-4, 5e-4, 5e-4).std(equations, found.start)
         true = true_state(own, np.array([0]))
