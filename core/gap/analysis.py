@@ -1,0 +1,327 @@
+"""The way from points to candidates: place, look, learn what the noise is, look again."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.gap import noise_found
+from core.gap.design import Design
+from core.gap.doings import Doings, doings
+from core.gap.effects.candidate import Candidate
+from core.gap.evidence import Chosen, Evidence, joined
+from core.gap.library import candidates
+from core.gap.observations import Observations
+from core.gap.placement import place, placement_slots, with_placement
+from core.gap.problem import Problem, pose_problem
+from core.gap.search import Found, search
+from core.gap.sharpened import encoder_steps, sharpened
+from core.gap.sim import Sim
+from core.gap.whitening import whitening
+from core.geometry import Array
+
+GEOMETRY_PRIORS = (3e-5, 1e-4, 3e-4, 1e-3, 3e-3)
+"""How well a sim's geometry may be known, rad and m; the data choose."""
+AS_CALIBRATED, CALIBRATED = 1e-4, 1.5e-4
+"""Geometry known so well is what a calibration leaves; beyond, it is itself a cause."""
+NULL_QUANTILE, NULL_MARGIN = 0.9, 3.0
+"""Of the largest evidence that noise alone makes; beyond a quantile it falls off as exp(-x)."""
+MOST_FLEXIBLE = 4
+PASSES = 3
+BENT = 0.15
+"""Curvature below this share of the noise does not matter."""
+CHANCE, LEAST_EXCESS = 3.5, 0.2
+"""Standard deviations, and logarithm of a ratio of variances, beyond which repeats scatter less than residuals."""
+SEARCHED_POINTS = 6000
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseFound:
+    """What is used for noise."""
+
+    covariance_m2: Array
+    """That the search takes for noise, (m, 3, 3)."""
+    floor_m2: Array
+    """Mean square length that noise makes at each point, (m,)."""
+    source: str
+    stated: bool
+    """Whether the campaign states any."""
+    freedom: float
+    tails: float
+    memory: float
+    excess: float
+    """Variance that is left over the noise's when everything flexible has been fitted."""
+    outliers: np.ndarray
+    """Indices of points that are left out, (k,)."""
+    weight: Array
+    """(m,)"""
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """One campaign, searched."""
+
+    sim: Sim
+    doings: Doings
+    problem: Problem
+    evidence: Evidence
+    geometry_prior: float
+    threshold: float
+    found: Found
+    given: Chosen
+    """Geometry and zero offsets that are off by more than a calibration leaves, as the whole of the data says."""
+    noise: NoiseFound
+    residual_m: Array
+    """Real minus placed sim, (m, 3), about the placement that was fitted alone."""
+    placed: Sim
+    """That sim."""
+
+    @property
+    def everything(self) -> Chosen:
+        return joined(self.given, self.found.chosen)
+
+
+def analyse(
+    seen: Observations,
+    without: frozenset[str] = frozenset(),
+    told: Callable[[Candidate], bool] | None = None,
+    progress: Progress = lambda share, what: None,
+) -> Analysis:
+    """Search the candidates for the causes of the gap.
+
+    Args:
+        without: effects that the library shall not know.
+        told: which named candidates are looked at; None: all.
+    """
+    fitted = ~seen.check if (~seen.check).any() else np.ones(seen.count, dtype=bool)
+    base_weight = fitted.astype(float)
+    progress(0.02, "placing base and targets")
+    covariance = seen.stated_covariance_m2
+    sim = placed = place(seen, base_weight / np.trace(covariance, axis1=1, axis2=2))
+    residual_m = seen.point_m - sim.points_m()
+    told_doings = doings(seen)
+    library = candidates(told_doings, without)
+    if told is not None:
+        library = [one for one in library if not one.named or told(one)]
+    progress(0.1, "estimating the noise")
+    first = noise = _first_noise(told_doings, residual_m, covariance, base_weight)
+    aim = residual_m
+    for turn in range(PASSES):
+        progress((turn + 0.5) / (PASSES + 1), "searching for causes")
+        white = whitening(noise.covariance_m2, noise.weight, noise.memory)
+        problem = pose_problem(sim, told_doings, library, aim, white)
+        best = _best_prior(problem)
+        learnt = _learn(told_doings, problem, best, first, told)
+        fresh = [one for one in learnt.sharper if one.place.effect not in without]
+        straight = learnt.bent_m2 < BENT**2 * noise.floor_m2.mean()
+        settled = _settled(noise, learnt.noise) and not _new(fresh, library) and straight
+        if settled or turn == PASSES - 1:
+            break
+        noise, library = learnt.noise, [*library, *fresh]
+        if not straight:
+            sim, aim = learnt.sim, learnt.residual_m
+    return Analysis(sim, told_doings, problem, *best, noise, residual_m, placed)
+
+
+@dataclass(frozen=True, eq=False)
+class Learnt:
+    """What one pass teaches the next."""
+
+    noise: NoiseFound
+    sharper: list[Candidate]
+    sim: Sim
+    """Placed where the strongest cause lets it stand."""
+    residual_m: Array
+    """Real minus that sim, as if the model were linear about the fitted state, (m, 3)."""
+    bent_m2: float
+    """Mean square of what linear columns miss."""
+
+
+def _settled(before: NoiseFound, after: NoiseFound) -> bool:
+    ratio = (
+        np.trace(after.covariance_m2, axis1=1, axis2=2).mean() / np.trace(before.covariance_m2, axis1=1, axis2=2).mean()
+    )
+    same = abs(ratio - 1) < 0.15 and abs(after.memory - before.memory) < 0.1
+    return bool(same and np.abs(after.weight - before.weight).mean() < 0.003)
+
+
+def _new(fresh: list[Candidate], library: list[Candidate]) -> bool:
+    known = {(one.place, one.atom) for one in library}
+    return any((one.place, one.atom) not in known for one in fresh)
+
+
+def _first_noise(told: Doings, residual_m: Array, covariance: Array, weight: Array) -> NoiseFound:
+    """The stated noise, corrected by repeats if there are any."""
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    whitened = np.einsum("mij,mj->mi", root, residual_m)
+    found = noise_found.repeats(told, whitened, weight > 0, near=True)
+    stated = bool(told.seen.campaign.instrument.sigma_m) or bool(
+        np.isfinite(told.seen.campaign.measurements.covariance_m2[told.seen.rows]).all()
+    )
+    source = "statement" if stated else "residuals"
+    freedom = 0.0
+    if found is not None:
+        covariance, source, freedom = _rescaled(covariance, found.variance), "replicates", found.freedom
+    floor = np.trace(covariance, axis1=1, axis2=2)
+    return NoiseFound(covariance, floor, source, stated, freedom, np.inf, 0.0, 1.0, np.zeros(0, dtype=int), weight)
+
+
+def _rescaled(covariance: Array, variance: float) -> Array:
+    """Stated covariances with the variance that was found: more is added evenly, less shrinks them."""
+    if variance <= 1:
+        return covariance * max(variance, 1e-12)
+    extra = (variance - 1) * np.trace(covariance, axis1=1, axis2=2).mean() / 3
+    return covariance + extra * np.eye(3)
+
+
+def _best_prior(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
+    """The geometry prior under which everything together is most probable, and what is found with it."""
+    best = None
+    for prior in GEOMETRY_PRIORS:
+        evidence = problem.evidence(prior)
+        threshold = null_threshold(problem, evidence)
+        found = search(evidence, problem.named, problem.cost, threshold)
+        total = found.log_evidence + evidence.nuisance_evidence
+        if best is None or total > best[0]:
+            best = (total, evidence, prior, threshold, found)
+        elif prior > 2 * best[2]:
+            break
+    assert best is not None
+    if best[2] <= CALIBRATED:
+        return (*best[1:], Chosen())
+    return _with_geometry(problem)
+
+
+def null_threshold(problem: Problem, evidence: Evidence) -> float:
+    """Log evidence that noise alone hardly ever makes of any candidate."""
+    return float(np.quantile(evidence.null_maxima(problem.cost), NULL_QUANTILE) + NULL_MARGIN)
+
+
+def _with_geometry(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
+    """The search when the sim's geometry is generally off: every frame and zero offset is a cause from the start."""
+    evidence = problem.evidence(AS_CALIBRATED)
+    threshold = null_threshold(problem, evidence)
+    given = Chosen()
+    members = [
+        k for k in problem.named if problem.candidates[k].place.effect == "geometry" or _zero_of_joint(problem, k)
+    ]
+    for k in members:
+        gain = evidence.gains(np.array([k]), given)
+        given = given.plus(int(k), float(max(gain.size[0], 1.0)))
+    found = search(evidence, problem.named, problem.cost, threshold, given)
+    return evidence, AS_CALIBRATED, threshold, found, given
+
+
+def _zero_of_joint(problem: Problem, k: int) -> bool:
+    candidate = problem.candidates[k]
+    return candidate.place.effect == "zero_offset" and candidate.atom == ""
+
+
+def _learn(
+    told: Doings,
+    problem: Problem,
+    best: tuple[Evidence, float, float, Found, Chosen],
+    first: NoiseFound,
+    only: Callable[[Candidate], bool] | None,
+) -> Learnt:
+    """What a flexible fit says of the noise, sharper atoms, and residuals about the fitted state."""
+    evidence, prior, threshold, found, given = best
+    everything = joined(given, found.chosen)
+    named_left, own = _left(problem, evidence, prior, everything)
+    left, _ = _left(problem, evidence, prior, _flexible(problem, evidence, everything, threshold))
+    noise = _learned_noise(told, problem, evidence, left, first)
+    scale = 3 * noise.weight / np.trace(noise.covariance_m2, axis1=1, axis2=2)
+    chosen = [problem.candidates[g] for g in everything.groups]
+    better = sharpened(problem.sim, told, chosen, named_left, own, scale)
+    bare, _ = _left(problem, evidence, prior, given)
+    for aim in (named_left, bare):
+        better += encoder_steps(problem.sim, told, aim, scale)
+    if only is not None:
+        better = [one for one in better if only(one)]
+    state = joined(given, Chosen(found.chosen.groups[:1], found.chosen.sizes[:1]))
+    return Learnt(noise, better, *_about_fit(problem, evidence, prior, state))
+
+
+def _flexible(problem: Problem, evidence: Evidence, chosen: Chosen, threshold: float) -> Chosen:
+    for _ in range(MOST_FLEXIBLE):
+        gains = evidence.gains(problem.nameless, chosen)
+        score = np.where(np.isin(problem.nameless, chosen.groups), -np.inf, gains.evidence)
+        best = int(np.argmax(score))
+        if not score[best] > threshold:
+            break
+        chosen = chosen.plus(int(problem.nameless[best]), float(gains.size[best]))
+    return chosen
+
+
+def numbers(problem: Problem, evidence: Evidence, prior: float, chosen: Chosen) -> tuple[np.ndarray, Array]:
+    """Columns of placement, geometry and chosen candidates, and their estimates from all points."""
+    index = np.concatenate([np.arange(problem.nuisance), evidence.index(chosen.groups)]).astype(int)
+    precision = np.concatenate([problem.nuisance_precision(prior), evidence.prior(chosen)])
+    square = problem.sums.square[np.ix_(index, index)] + np.diag(precision)
+    return index, np.linalg.solve(square, problem.sums.pull[index])
+
+
+def _left(problem: Problem, evidence: Evidence, prior: float, chosen: Chosen) -> tuple[Array, list[Array]]:
+    """Residuals after a fit of all points, and what each chosen candidate moves, (m, 3) each."""
+    index, estimate = numbers(problem, evidence, prior, chosen)
+    plain = problem.design.some(index).whole()
+    own, at = [], problem.nuisance
+    for g in chosen.groups:
+        width = problem.slices[g].stop - problem.slices[g].start
+        own.append(plain[:, :, at : at + width] @ estimate[at : at + width])
+        at += width
+    return problem.residual_m - plain @ estimate, own
+
+
+def _about_fit(problem: Problem, evidence: Evidence, prior: float, chosen: Chosen) -> tuple[Sim, Array, float]:
+    """The sim placed anew, and residuals as if the model were linear about the fitted state: exact there.
+
+    The strongest candidate alone sets the state: weaker ones may be there only because the model was bent.
+    """
+    sim = problem.sim
+    if sim.seen.simulated_m is not None:
+        return sim, problem.residual_m, 0.0
+    index, estimate = numbers(problem, evidence, prior, chosen)
+    slots = placement_slots(sim.seen)
+    anew = with_placement(sim, slots, estimate[: len(slots)])
+    rest = Design(anew, problem.design.some(index[len(slots) :]).columns, problem.design.scale[index[len(slots) :]])
+    left = estimate[len(slots) :]
+    bent = anew.moved_m(rest.motions(left)) - anew.points_m() - rest.whole() @ left
+    old = problem.design.some(index)
+    missed = anew.moved_m(rest.motions(left)) - sim.points_m() - old.whole() @ estimate
+    missed -= sim.seen.point_m - sim.points_m() - problem.residual_m
+    return anew, sim.seen.point_m - anew.points_m() - bent, float(np.mean(np.sum(missed**2, axis=1)))
+
+
+def _learned_noise(told: Doings, problem: Problem, evidence: Evidence, left: Array, first: NoiseFound) -> NoiseFound:
+    """Scale, tails, memory and outliers of what a flexible fit leaves, beside the scatter of repeats."""
+    covariance = first.covariance_m2
+    standard = whitening(covariance, np.ones(len(left))).rows(left)
+    used = first.weight > 0
+    freedom = max(3 * np.count_nonzero(used) - problem.nuisance, 3)
+    variance = noise_found.robust_variance(standard[used]) * 3 * np.count_nonzero(used) / freedom
+    scaled = standard / np.sqrt(max(variance, 1e-300))
+    memory = noise_found.memory(told, scaled, used)
+    weight = first.weight.copy()
+    outlying = np.flatnonzero(used & (np.abs(scaled).max(axis=1) > noise_found.OUTLYING))
+    weight[outlying] = 0.0
+    inlying = weight > 0
+    tails = noise_found.tail_degrees(scaled[inlying])
+    weight[inlying] *= noise_found.student_weights(scaled[inlying], tails)
+    covariance = _rescaled(covariance, variance)
+    floor, source, excess = np.trace(covariance, axis1=1, axis2=2), "residuals", 1.0
+    if first.stated and first.source != "replicates":
+        # Nothing says that what is left beyond a stated noise is noise.
+        floor = first.floor_m2
+    again = noise_found.repeats(told, standard, inlying, near=False)
+    if again is not None:
+        repeated = again.variance / max(1.0 - memory**again.lag, 0.05)
+        source, excess = "replicates", variance / max(repeated, 1e-300)
+        spread = np.sqrt(2 / again.freedom + 2 / freedom)
+        if np.log(excess) > max(CHANCE * spread, LEAST_EXCESS):
+            floor = np.trace(_rescaled(first.covariance_m2, repeated), axis1=1, axis2=2)
+        else:
+            excess, freedom = 1.0, freedom + again.freedom
+    return NoiseFound(covariance, floor, source, first.stated, freedom, tails, memory, excess, outlying, weight)

@@ -1,0 +1,413 @@
+"""The whole way from a campaign to what is said of its gap."""
+
+import resource
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from core.calibrated_arm import CalibratedArm
+from core.gap.advice import advice
+from core.gap.analysis import Analysis, Progress, analyse
+from core.gap.corrected import CorrectedSim, Diagnosis
+from core.gap.detection import detection_limits
+from core.gap.effects.candidate import Candidate
+from core.gap.evidence import Chosen, joined
+from core.gap.folds import blocks
+from core.gap.kept_out import KeptOut, mean_square
+from core.gap.observations import observe
+from core.gap.open_set import Judge, Stand, stands
+from core.gap.placement import placement_slots
+from core.gap.posterior import rivals, twins
+from core.gap.result import (
+    UNKNOWN,
+    Cause,
+    Cell,
+    LeftTest,
+    NoiseModel,
+    Outlier,
+    Parameter,
+    Place,
+    Rivals,
+    Verdict,
+)
+from core.gap.scatter import scattering_joint
+from core.gap.transfer import transfers
+from core.gap.warnings_of import warnings_of
+from core.gap.where import where
+from core.geometry import Array
+from core.measurements import Campaign
+
+HOLD_OUT = "fifths of each arc and regions of the joint space, each predicted from the others"
+SURE_OF_REST = 0.1
+"""What nameless functions must still close, as a share of the gap, to be told as something unknown."""
+CLOSED = 0.9
+"""Share of the gap beyond the floor that causes must close to explain it."""
+NOISE_LIKE = 0.01
+"""Probability below which what is left is not noise."""
+
+
+def quiet(share: float, what: str) -> None:
+    """Progress that nobody watches."""
+
+
+def diagnose(
+    campaign: Campaign,
+    arm: CalibratedArm | None = None,
+    told: Sequence[dict[str, object]] | None = None,
+    without: Sequence[str] = (),
+    progress: Progress = quiet,
+) -> Diagnosis:
+    """Where real and sim part, which effects cause it, how far the gap shrinks on points kept out of every fit.
+
+    Args:
+        arm: a calibrated arm as the sim; None: the campaign's nominal robot, or the simulated points in it.
+        told: the causes, as answers name them: nothing else is searched; None: nobody knows.
+        without: effects that the library shall not know.
+        progress: called with a share of the work and what is being done.
+
+    Raises:
+        CampaignError: there is nothing to compare.
+    """
+    start = time.perf_counter()
+    seen = observe(campaign, arm)
+    only = None if told is None else _only(told)
+    analysis = analyse(seen, frozenset(without), only, progress or quiet)
+    (progress or quiet)(0.85, "judging causes on kept-out points")
+    found = Findings(analysis, blocks(seen), told is not None)
+    report = _report(campaign, arm, found)
+    (progress or quiet)(1.0, "done")
+    return replace(
+        report,
+        seconds=time.perf_counter() - start,
+        peak_memory_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    )
+
+
+def _only(told: Sequence[dict[str, object]]):
+    def wanted(candidate: Candidate) -> bool:
+        return any(_is(candidate.place, answer) for answer in told)
+
+    return wanted
+
+
+def _is(place: Place, answer: dict[str, object]) -> bool:
+    keys = {"joint": place.joint, "link": place.joint, "frame": place.frame, "target": place.target}
+    keys |= {"from": place.source, "to": place.joint}
+    return place.effect == answer.get("effect") and all(
+        keys[key] == value for key, value in answer.items() if key in keys and value is not None
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What stands, and how well it predicts points that no fit has seen."""
+
+    analysis: Analysis
+    fold: np.ndarray
+    told: bool
+
+    @cached_property
+    def judge(self) -> Judge:
+        a = self.analysis
+        floor = float(np.mean(a.noise.floor_m2))
+        return Judge(a.problem, a.evidence, self.fold, a.geometry_prior, a.threshold, floor, a.found.chosen, a.given)
+
+    @cached_property
+    def floor_m2(self) -> float:
+        return float(np.mean(self.analysis.noise.floor_m2))
+
+    @cached_property
+    def stands(self) -> list[Stand]:
+        """Named causes, the one that closes most first, then unknown ones."""
+        judged = self._told_stands() if self.told else [*self._geometry_stands(), *stands(self.judge)]
+        named = [one for one in judged if not one.unknown]
+        order = sorted(named, key=lambda one: self.judge.square(_chosen([one])))
+        if self.told:
+            return order
+        return [*order, *self._unknown([one for one in judged if one.unknown], order)]
+
+    @cached_property
+    def named(self) -> list[Stand]:
+        return [one for one in self.stands if not one.unknown]
+
+    def _told_stands(self) -> list[Stand]:
+        everything = self.analysis.everything
+        return [
+            Stand(self.analysis.problem.candidates[g].place, (g,), (s,), 1.0)
+            for g, s in zip(everything.groups, everything.sizes, strict=True)
+        ]
+
+    def _geometry_stands(self) -> list[Stand]:
+        given = self.analysis.given
+        candidates = self.analysis.problem.candidates
+        return [Stand(candidates[g].place, (g,), (s,), 1.0) for g, s in zip(given.groups, given.sizes, strict=True)]
+
+    def _unknown(self, located: list[Stand], named: list[Stand]) -> list[Stand]:
+        """What acts without a name: at places where names failed, and where all names leave something."""
+        judge, out = self.judge, list(located)
+        so_far = _chosen([*named, *located])
+        left = judge.square(so_far)
+        rest = judge.rest if named or located else judge.lone
+        if rest.groups and left - judge.square(joined(so_far, rest)) > SURE_OF_REST * judge.closable_m2:
+            place = judge.problem.candidates[rest.groups[0]].place
+            unknown = Place(UNKNOWN, joint=place.joint, variable=place.variable)
+            if not any(one.place.same_as(unknown) for one in out):
+                out.append(Stand(unknown, rest.groups, rest.sizes, 0.0))
+        if not out and not named and self.analysis.noise.excess > 1:
+            joint = scattering_joint(self.analysis.problem, self.left_m)
+            if joint is not None:
+                out.append(Stand(Place(UNKNOWN, joint=joint), (), (), 0.0))
+        return out
+
+    @cached_property
+    def chosen(self) -> Chosen:
+        """All named causes."""
+        return _chosen(self.named)
+
+    @cached_property
+    def kept(self) -> KeptOut:
+        everything = joined(self.analysis.given, self.chosen, _chosen(self.stands), self.judge.rest, self.judge.lone)
+        return KeptOut(self.analysis.problem, self.fold, self.analysis.geometry_prior, everything.groups)
+
+    @cached_property
+    def gap_m2(self) -> float:
+        """With base and targets placed alone."""
+        return mean_square(self._placed_left()[self.kept.judged])
+
+    @cached_property
+    def left_m2(self) -> float:
+        """With all named causes."""
+        return self.kept.square_m2(self.chosen)
+
+    @cached_property
+    def left_m(self) -> Array:
+        """Residuals after all named causes, fitted on all points, (m, 3)."""
+        index, numbers, _ = self.kept.fitted(self.chosen)
+        return self.analysis.problem.residual_m - self.kept.plain[:, :, index] @ numbers
+
+    def _placed_left(self) -> Array:
+        """Residuals with base and targets alone, about their own placement, each fold from the others, (m, 3)."""
+        a = self.analysis
+        slots = placement_slots(a.placed.seen)
+        if not slots:
+            return a.residual_m
+        fields, weight = a.placed.fields(slots), a.noise.weight / a.noise.floor_m2
+        square = np.einsum("mck,m,mcl->mkl", fields, weight, fields, optimize=True)
+        pull = np.einsum("mck,m,mc->mk", fields, weight, a.residual_m, optimize=True)
+        out = np.empty_like(a.residual_m)
+        for f in np.unique(self.fold):
+            fit = (self.fold != f) & (a.noise.weight > 0)
+            whole = square[fit].sum(axis=0)
+            whole += 1e-9 * np.trace(whole) / len(whole) * np.eye(len(whole))
+            mine = self.fold == f
+            out[mine] = a.residual_m[mine] - fields[mine] @ np.linalg.solve(whole, pull[fit].sum(axis=0))
+        return out
+
+    @cached_property
+    def left_test(self) -> LeftTest:
+        """Whether the largest evidence that is left for anything is what noise makes."""
+        a = self.analysis
+        groups = np.arange(len(a.problem.candidates))
+        given = joined(a.given, self.chosen)
+        score = a.evidence.gains(groups, given).evidence - a.problem.cost
+        score[np.isin(groups, given.groups)] = -np.inf
+        most = float(score.max())
+        p_value = float(min(1.0, 0.1 * np.exp(-(most - (a.threshold - 3.0)))))
+        shares = abs(self.left_m2 - self.floor_m2) < 0.02 * max(self.gap_m2 - self.floor_m2, 0.0) + 0.05 * self.floor_m2
+        noise_like = (p_value > NOISE_LIKE or bool(shares)) and a.noise.excess == 1
+        return LeftTest("largest evidence left for any cause", p_value, noise_like)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        if not self.stands and self.analysis.noise.excess == 1:
+            return Verdict.NO_GAP
+        if not self.named:
+            return Verdict.UNEXPLAINED
+        base = max(self.gap_m2 - self.floor_m2, 1e-3 * self.floor_m2)
+        unknown = any(one.unknown for one in self.stands)
+        closed = (self.gap_m2 - self.left_m2) / base >= CLOSED or self.left_test.left_is_noise
+        return Verdict.EXPLAINED if closed and not unknown else Verdict.PARTLY_EXPLAINED
+
+
+def _chosen(some: Sequence[Stand]) -> Chosen:
+    return joined(*(Chosen(one.groups, one.sizes) for one in some))
+
+
+def _report(campaign: Campaign, arm: CalibratedArm | None, found: Findings) -> Diagnosis:
+    a = found.analysis
+    causes = _causes(found)
+    gap = found.verdict is not Verdict.NO_GAP
+    noise = a.noise
+    return Diagnosis(
+        campaign=campaign,
+        sim=a.sim.seen.sim,
+        rows=a.sim.seen.rows,
+        difference_m=a.residual_m,
+        left_m=found.left_m,
+        verdict=found.verdict,
+        gap_rms_m=float(np.sqrt(found.gap_m2)),
+        left_rms_m=float(np.sqrt(found.left_m2)),
+        noise=_noise_model(campaign, found),
+        causes=causes,
+        where=where(a.placed, a.residual_m, a.problem, a.evidence, gap),
+        transfers=transfers(a.problem, a.geometry_prior, Chosen(), found.chosen),
+        left_test=found.left_test,
+        limits=detection_limits(a.problem, a.evidence, a.threshold),
+        rivals=_rivals(found, causes),
+        outliers=tuple(
+            Outlier(int(a.sim.seen.record[k]), float(np.linalg.norm(found.left_m[k]))) for k in noise.outliers
+        ),
+        warnings=warnings_of(a.doings, noise),
+        evidence_map=_evidence_map(found) if gap else (),
+        reliability=None,
+        hold_out=HOLD_OUT,
+        corrected=_corrected(arm, found),
+    )
+
+
+def _noise_model(campaign: Campaign, found: Findings) -> NoiseModel:
+    noise = found.analysis.noise
+    used = float(np.sqrt(np.trace(noise.covariance_m2, axis1=1, axis2=2).mean() / 3))
+    repeats = noise.source == "replicates"
+    stated = campaign.instrument.sigma_m
+    return NoiseModel(
+        stated_m=stated,
+        used_m=used,
+        source=noise.source,
+        degrees_of_freedom=float(noise.freedom),
+        tail_degrees=float(noise.tails),
+        correlation=float(noise.memory),
+        floor_rms_m=float(np.sqrt(found.floor_m2)),
+        floor_source="repeats" if repeats else "sigma" if noise.stated else "unknown",
+    )
+
+
+def _causes(found: Findings) -> tuple[Cause, ...]:
+    """Every cause with what it closes: alone, in its turn, and last."""
+    judge, kept = found.judge, found.kept
+    total = max(found.gap_m2 - found.floor_m2, 1e-3 * found.floor_m2)
+    base = kept.square_m2(Chosen())
+    so_far, before, out = Chosen(), base, []
+    for stand in found.stands:
+        own = _chosen([stand])
+        others = _chosen([one for one in found.named if one is not stand])
+        so_far = joined(so_far, own)
+        after = kept.square_m2(so_far)
+        last = kept.square_m2(others) - kept.square_m2(joined(others, own))
+        probability, alike = _probability(found, stand, others)
+        out.append(
+            Cause(
+                place=stand.place,
+                probability=probability,
+                twins=alike,
+                parameters=_parameters(found, stand),
+                gap_before_rms_m=float(np.sqrt(before)),
+                gap_after_rms_m=float(np.sqrt(after)),
+                share_closed=float((base - kept.square_m2(own)) / total),
+                share_closed_last=float(last / total),
+                shift_m=_shift(found, stand),
+            )
+        )
+        before = after
+    return tuple(out)
+
+
+def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, tuple[Place, ...]]:
+    if stand.unknown:
+        return UNKNOWN_PROBABILITY, (stand.place,)
+    if found.told or stand.groups[0] in found.analysis.given.groups:
+        return 1.0, (stand.place,)
+    return twins(stand, rivals(found.judge, stand, others))
+
+
+UNKNOWN_PROBABILITY = 0.8
+"""That something without a name acts at that joint or variable."""
+
+
+def _parameters(found: Findings, stand: Stand) -> tuple[Parameter, ...]:
+    if stand.unknown:
+        return ()
+    problem = found.analysis.problem
+    index, numbers, covariance = found.kept.fitted(found.chosen)
+    at = _position(found, found.chosen, stand.groups[0])
+    candidate = problem.candidates[stand.groups[0]]
+    scale = problem.design.scale[problem.slices[stand.groups[0]]]
+    own = slice(at, at + len(scale))
+    stds = np.sqrt(np.diag(covariance)[own]) * scale
+    values = numbers[own] * scale
+    fitted = [Parameter(n, float(v), float(s)) for n, v, s in zip(candidate.names, values, stds, strict=True)]
+    return (*fitted, *(Parameter(name, value, float("nan")) for name, value in candidate.fixed))
+
+
+def _position(found: Findings, chosen: Chosen, group: int) -> int:
+    """Where a chosen candidate's columns begin among those of a fit."""
+    problem = found.analysis.problem
+    at = problem.nuisance
+    for g in chosen.groups:
+        if g == group:
+            return at
+        at += problem.slices[g].stop - problem.slices[g].start
+    raise ValueError(f"candidate {group} is not among the chosen")
+
+
+def _shift(found: Findings, stand: Stand) -> Array:
+    """What one cause moves when all are fitted together, (m, 3)."""
+    chosen = joined(found.chosen, _chosen([stand]))
+    index, numbers, _ = found.kept.fitted(chosen)
+    out = np.zeros_like(found.analysis.problem.residual_m)
+    for g in stand.groups:
+        at = _position(found, chosen, g)
+        width = found.analysis.problem.slices[g].stop - found.analysis.problem.slices[g].start
+        own = slice(at, at + width)
+        out += found.kept.plain[:, :, index[own]] @ numbers[own]
+    return out
+
+
+def _rivals(found: Findings, causes: tuple[Cause, ...]) -> tuple[Rivals, ...]:
+    return tuple(advice(found.analysis, cause.twins) for cause in causes if len(cause.twins) > 1)
+
+
+def _evidence_map(found: Findings) -> tuple[Cell, ...]:
+    """Every named effect and place when it stands alone, for those that say anything."""
+    a = found.analysis
+    total = max(2 * float(np.max(a.found.alone, initial=0.0)), 1e-300)
+    cells: dict[tuple[object, ...], Cell] = {}
+    for k in a.problem.named:
+        place, score = a.problem.candidates[k].place, float(a.found.alone[k])
+        key = (place.effect, place.joint, place.source, place.frame, place.target)
+        if np.isfinite(score) and (key not in cells or score > cells[key].evidence):
+            closed = min(max(2 * score / total, 0.0), 1.0) * _best_closure(found)
+            cells[key] = Cell(place, score, closed)
+    return tuple(cells.values())
+
+
+def _best_closure(found: Findings) -> float:
+    if not found.named:
+        return 0.0
+    base = found.kept.square_m2(Chosen())
+    total = max(found.gap_m2 - found.floor_m2, 1e-300)
+    return float((base - found.kept.square_m2(_chosen(found.named[:1]))) / total)
+
+
+def _corrected(arm: CalibratedArm | None, found: Findings) -> CorrectedSim:
+    a = found.analysis
+    problem = a.problem
+    index, numbers, _ = found.kept.fitted(found.chosen)
+    scaled = numbers * np.concatenate(
+        [
+            problem.design.scale[: problem.nuisance],
+            *(problem.design.scale[problem.slices[g]] for g in found.chosen.groups),
+        ]
+    )
+    slots = [column[0][0] for column in problem.design.columns[: problem.nuisance]]
+    geometry = tuple((slots[k], float(scaled[k])) for k in range(problem.placement, problem.nuisance))
+    at, causes, values = problem.nuisance, [], []
+    for g in found.chosen.groups:
+        width = problem.slices[g].stop - problem.slices[g].start
+        causes.append(problem.candidates[g])
+        values.append(scaled[at : at + width])
+        at += width
+    return CorrectedSim(arm, tuple(causes), tuple(values), geometry, a.sim.seen.campaign.digest)

@@ -1,0 +1,166 @@
+"""What weights do: drives give, links bend and twist, and the tool carries more than the sim thinks."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from core.gap.doings import Doings
+from core.gap.effects.candidate import ANGLE, Candidate, Column, drive, motors, unit
+from core.gap.result import Place
+from core.gap.sim import Part, Slot
+from core.geometry import Array
+
+ROUGHLY = 0.3
+"""How far off masses may well be, as a share."""
+NEAR_M = 0.1
+"""How far from the tool's point a payload's centre may well be."""
+LEAST_TORQUE = 0.02
+"""Torques that change by less bend nothing, N m."""
+LEAST_SHARE = 0.02
+"""A load below this share of the largest of its kind is none."""
+
+
+def compliances(doings: Doings) -> list[Candidate]:
+    """g = q + load / stiffness, the load from gravity and payload, or as the robot reports it."""
+    out = []
+    if doings.drive_load is not None:
+        for j in motors(doings):
+            if _loaded(doings.drive_load, j):
+                out.append(_compliance(doings, j, "torque from weights", _from_weights(j)))
+            if _loaded(doings.drive_load, j) or _loaded_off_centre(doings, j):
+                out.append(_generous_compliance(doings, j))
+    torque = doings.logged("torque_nm")
+    if torque is not None:
+        out += [
+            _compliance(doings, j, "torque as reported", _reported(j)) for j in motors(doings) if _loaded(torque, j)
+        ]
+    return out
+
+
+def flexures(doings: Doings) -> list[Candidate]:
+    """A link turns about its middle under the moment that it passes on."""
+    moment = doings.middle_moment
+    if moment is None:
+        return []
+    largest = np.abs(moment).max()
+    links = [
+        i
+        for i in range(min(doings.seen.joint_count, doings.seen.link.max()))
+        if np.ptp(moment[:, i], axis=0).max() > LEAST_SHARE * max(largest, 1e-9)
+    ]
+    return [_flexure(i, float(np.abs(moment[:, i]).max()), rough) for i in links for rough in (False, True)]
+
+
+def payloads(doings: Doings) -> list[Candidate]:
+    """The drives give under a mass at the tool that the sim does not carry: one that was logged, or one always there."""
+    per_kg = doings.kilogram_load
+    if per_kg is None:
+        return []
+    out = []
+    for logged in (False, True):
+        if logged and np.ptp(doings.seen.payload_kg) == 0:
+            continue
+        acting = per_kg * doings.seen.payload_kg[:, None] if logged else per_kg
+        heaviest = {j: float(np.abs(per_kg[:, j]).max()) for j in motors(doings) if _loaded(acting, j)}
+        if heaviest:
+            out += [_payload(doings, heaviest, logged, centre) for centre in (False, True)]
+    return out
+
+
+def _loaded_off_centre(doings: Doings, joint: int) -> bool:
+    """Whether a payload beside the tool's point would load a joint that it does not load at that point."""
+    offset = NEAR_M * doings.seen.payload_kg[:, None] * doings.offset_load[:, joint]
+    return bool(np.ptp(offset, axis=0).max() > LEAST_TORQUE)
+
+
+def _generous_compliance(doings: Doings, joint: int) -> Candidate:
+    """The same where masses and the payload's centre are not quite those that are written down, or the drive stiffens."""
+    plain = _compliance(doings, joint, "torque from weights that are roughly known", _from_weights(joint))
+    off = NEAR_M * doings.seen.payload_kg[:, None] * doings.offset_load[:, joint]
+    largest = max(ANGLE / plain.reference[0], float(np.abs(off).max()))
+
+    def columns(doings: Doings) -> list[Column]:
+        load, own = doings.drive_load[:, joint], doings.own_load[:, joint]
+        offset = doings.seen.payload_kg[:, None] * doings.offset_load[:, joint]
+        extra = (own, load * np.abs(load) / largest, *offset.T)
+        return plain.columns(doings) + [drive(doings, joint, feature) for feature in extra]
+
+    name = plain.names[0]
+    names = (name, f"{name}_of_own_weight", f"{name}_at_full_load", *(f"{name}_times_offset_{a}_m" for a in "xyz"))
+    one = ANGLE / largest
+    rough, near = ROUGHLY * one, NEAR_M * one
+    return replace(plain, names=names, columns=columns, reference=(one, rough, rough, near, near, near))
+
+
+def _loaded(load, joint: int) -> bool:
+    return bool(np.ptp(load[:, joint]) > LEAST_SHARE * max(float(np.abs(load).max()), 1e-9))
+
+
+def _from_weights(joint: int):
+    return lambda doings: doings.drive_load[:, joint]
+
+
+def _reported(joint: int):
+    def torque(doings: Doings):
+        logged = doings.logged("torque_nm")
+        return np.zeros(doings.count) if logged is None else logged[:, joint]
+
+    return torque
+
+
+def _compliance(doings: Doings, joint: int, atom: str, load) -> Candidate:
+    of, force = unit(doings, joint), "n" if doings.seen.chain.sliding[joint] else "nm"
+    largest = max(float(np.abs(load(doings)).max()), 1e-9)
+
+    def columns(doings: Doings) -> list[Column]:
+        return [drive(doings, joint, load(doings))]
+
+    return Candidate(
+        Place("compliance", joint=joint + 1), atom, (f"give_{of}_per_{force}",), columns, 1, (ANGLE / largest,)
+    )
+
+
+def _flexure(link: int, largest: float, rough: bool) -> Candidate:
+    def columns(doings: Doings) -> list[Column]:
+        moment, middle = doings.middle_moment[:, link], doings.loads.middle_m[link]
+        out = [_bend(link, k, moment[:, k], middle) for k in range(3)]
+        if rough:
+            offset = doings.seen.payload_kg[:, None, None] * doings.loads.middle_offset[:, link]
+            out += [_bend(link, k, doings.loads.middle_own[:, link, k], middle) for k in range(3)]
+            out += [_bend(link, k, offset[:, k, c], middle) for k in range(3) for c in range(3)]
+        return out
+
+    names = tuple(f"give_about_{axis}_rad_per_nm" for axis in "xyz")
+    reference = (ANGLE / max(largest, 1e-9),) * 3
+    if rough:
+        names += tuple(f"give_about_{axis}_of_own_weight_rad_per_nm" for axis in "xyz")
+        names += tuple(f"give_about_{axis}_times_offset_{c}_m" for axis in "xyz" for c in "xyz")
+        reference += (ROUGHLY * reference[0],) * 3 + (NEAR_M * reference[0],) * 9
+    atom = "under weights that are roughly known" if rough else ""
+    return Candidate(Place("flexure", joint=link + 1), atom, names, columns, 2, reference)
+
+
+def _bend(link: int, axis: int, angle: Array, middle: Array) -> Column:
+    """A link turns by an angle about an axis through its middle."""
+    away = np.cross(middle, np.eye(3)[axis])
+    column = [(Slot(Part.LINK, link, axis), angle)]
+    return column + [(Slot(Part.LINK, link, 3 + c), angle * away[c]) for c in range(3) if abs(away[c]) > 1e-12]
+
+
+def _payload(doings: Doings, heaviest: dict[int, float], logged: bool, centre: bool) -> Candidate:
+    def columns(doings: Doings) -> list[Column]:
+        kg = doings.seen.payload_kg if logged else np.ones(doings.count)
+        out = [drive(doings, j, kg * doings.kilogram_load[:, j]) for j in heaviest]
+        if centre:
+            for k in range(3):
+                shares = [(j, kg * doings.offset_load[:, j, k] / heaviest[j]) for j in heaviest]
+                out.append([term for j, feature in shares for term in drive(doings, j, feature)])
+        return out
+
+    atom = ("of the logged payload" if logged else "always there") + (", its centre elsewhere" if centre else "")
+    names = tuple(f"give_of_joint_{j + 1}_for_each_kilogram_1" for j in heaviest)
+    reference = tuple(ANGLE / h for h in heaviest.values())
+    if centre:
+        names += tuple(f"offset_{axis}_times_give_m" for axis in "xyz")
+        reference += (ANGLE * NEAR_M,) * 3
+    return Candidate(Place("payload"), atom, names, columns, 4, reference)

@@ -1,0 +1,63 @@
+"""What a joint loses when its motor turns round: at once (backlash), or over some way (hysteresis)."""
+
+import numpy as np
+
+from core.gap.doings import Doings
+from core.gap.effects.candidate import ANGLE, Candidate, Column, drive, motors, unit
+from core.gap.result import Place
+
+FRICTION_SHARES = (0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9)
+"""Of the largest load: below it friction holds the joint behind its motor, above it gravity decides."""
+BUILD_UP_RAD, BUILD_UP_M = (0.05, 0.15, 0.5), (0.005, 0.015, 0.05)
+LEAST_LOAD = 0.1
+"""Loads below this turn nothing, N m or N."""
+
+
+def backlashes(doings: Doings) -> list[Candidate]:
+    """g = q + b/2 on the upper flank, q - b/2 on the lower, which flank by motor or by gravity."""
+    if not doings.past.complete:
+        return []
+    out = []
+    for j in motors(doings):
+        load = None if doings.drive_load is None else np.abs(doings.drive_load[:, j]).max()
+        levels = [np.inf]
+        if load is not None and load > LEAST_LOAD:
+            levels += [float(share * load) for share in FRICTION_SHARES]
+        out += [_backlash(doings, j, level, len(levels)) for level in levels]
+    return out
+
+
+def hystereses(doings: Doings) -> list[Candidate]:
+    """A loss that grows with the way since the motor turned round, and with the load."""
+    return [_hysteresis(doings, j) for j in motors(doings)] if doings.past.complete else []
+
+
+def _backlash(doings: Doings, joint: int, friction: float, choices: int) -> Candidate:
+    def columns(doings: Doings) -> list[Column]:
+        if np.isinf(friction):
+            return [drive(doings, joint, -doings.sense[:, joint] / 2)]
+        return [drive(doings, joint, doings.past.flank(joint, friction) / 2)]
+
+    of = unit(doings, joint)
+    load = "N" if of == "m" else "N m"
+    atom = "taken up by the motor" if np.isinf(friction) else f"taken up by loads above {friction:.3g} {load}"
+    return Candidate(Place("backlash", joint=joint + 1), atom, (f"gap_{of}",), columns, choices, (ANGLE,))
+
+
+def _hysteresis(doings: Doings, joint: int) -> Candidate:
+    of = unit(doings, joint)
+    ways = BUILD_UP_M if of == "m" else BUILD_UP_RAD
+    heavy = 0.0 if doings.drive_load is None else float(np.abs(doings.drive_load[:, joint]).max())
+
+    def columns(doings: Doings) -> list[Column]:
+        sense, travel = doings.sense[:, joint], doings.travel[:, joint]
+        out = [drive(doings, joint, -sense / 2)]
+        out += [drive(doings, joint, -sense / 2 * np.exp(-travel / way)) for way in ways]
+        if heavy > LEAST_LOAD and doings.drive_load is not None:
+            out.append(drive(doings, joint, -sense / 2 * np.abs(doings.drive_load[:, joint]) / heavy))
+        return out
+
+    names = [f"loss_{of}"] + [f"not_yet_after_{1e3 * way:g}_{'mm' if of == 'm' else 'mrad'}_{of}" for way in ways]
+    if heavy > LEAST_LOAD:
+        names.append(f"with_load_{of}")
+    return Candidate(Place("hysteresis", joint=joint + 1), "", tuple(names), columns, 1, (ANGLE,) * len(names))

@@ -1,0 +1,100 @@
+"""Smooth functions without a name: of one joint's place, of the sense it came in, of time, of the whole configuration.
+
+They stand for whatever the library does not know, and tell where it acts.
+"""
+
+import numpy as np
+
+from core.gap.doings import Doings
+from core.gap.effects.candidate import ANGLE, LENGTH, Candidate, Column, drive, motors
+from core.gap.result import Place
+from core.gap.sim import Part, Slot
+from core.geometry import Array
+
+JOINT, SENSE, TIME, CONFIGURATION, LOAD = "?joint", "?sense", "?time", "?configuration", "?load"
+BUMPS, TIME_BUMPS, WAVES = 9, 11, 24
+SEED = 3
+
+
+def nameless(doings: Doings) -> list[Candidate]:
+    """All of them."""
+    out = [_joint(doings, j) for j in motors(doings)]
+    if doings.past.complete:
+        out += [_sense(doings, j) for j in motors(doings)]
+    if np.ptp(doings.seen.payload_kg) > 0:
+        out.append(_load(doings))
+    return [*out, _time(), _configuration(doings)]
+
+
+def _bumps(x: Array, low: float, high: float, count: int) -> Array:
+    centres = np.linspace(low, high, count)
+    width = max(centres[1] - centres[0], 1e-12)
+    return np.exp(-0.5 * ((x[:, None] - centres) / width) ** 2)
+
+
+def _joint(doings: Doings, joint: int) -> Candidate:
+    low, high = doings.active[:, joint].min(), doings.active[:, joint].max()
+    own = 3 if doings.seen.chain.sliding[joint] else 0
+    size = LENGTH if own else ANGLE
+
+    def columns(doings: Doings) -> list[Column]:
+        bumps = _bumps(doings.active[:, joint], low, high, BUMPS)
+        return [[(Slot(Part.LINK, joint, own + k), bumps[:, b])] for b in range(BUMPS) for k in range(3)]
+
+    names = tuple(f"bump_{b}_{k}" for b in range(BUMPS) for k in range(3))
+    return Candidate(Place(JOINT, joint=joint + 1), "", names, columns, 1, (size,) * len(names))
+
+
+def _sense(doings: Doings, joint: int) -> Candidate:
+    low, high = doings.active[:, joint].min(), doings.active[:, joint].max()
+
+    def columns(doings: Doings) -> list[Column]:
+        bumps = doings.sense[:, joint, None] * _bumps(doings.active[:, joint], low, high, BUMPS)
+        return [drive(doings, joint, bumps[:, b]) for b in range(BUMPS)]
+
+    names = tuple(f"bump_{b}" for b in range(BUMPS))
+    return Candidate(Place(SENSE, joint=joint + 1), "", names, columns, 1, (ANGLE,) * BUMPS)
+
+
+def _time() -> Candidate:
+    def columns(doings: Doings) -> list[Column]:
+        bumps = _bumps(doings.seen.time, 0.0, 1.0, TIME_BUMPS)
+        return [[(Slot(Part.BASE, 0, k), bumps[:, b])] for b in range(TIME_BUMPS) for k in range(6)]
+
+    names = tuple(f"bump_{b}_{k}" for b in range(TIME_BUMPS) for k in range(6))
+    return Candidate(
+        Place(TIME, variable="time"), "", names, columns, 1, ((ANGLE / 2,) * 3 + (LENGTH,) * 3) * TIME_BUMPS
+    )
+
+
+def _waves(doings: Doings) -> tuple[Array, Array]:
+    rng = np.random.default_rng(SEED)
+    span = np.maximum(doings.seen.span, 1e-6)
+    low = doings.active.min(axis=0)
+    direction = rng.normal(0, 1.8, (WAVES, len(span))) / span
+    direction[:, doings.seen.span < 1e-6] = 0.0
+    return direction, rng.uniform(0, 2 * np.pi, WAVES) - direction @ low
+
+
+def _configuration(doings: Doings) -> Candidate:
+    direction, phase = _waves(doings)
+
+    def columns(doings: Doings) -> list[Column]:
+        waves = np.cos(doings.active @ direction.T + phase)
+        return [[(Slot(Part.BASE, 0, 3 + k), waves[:, w])] for w in range(WAVES) for k in range(3)]
+
+    names = tuple(f"wave_{w}_{k}" for w in range(WAVES) for k in range(3))
+    return Candidate(Place(CONFIGURATION, variable="configuration"), "", names, columns, 1, (LENGTH,) * len(names))
+
+
+def _load(doings: Doings) -> Candidate:
+    direction, phase = _waves(doings)
+    most = max(float(np.abs(doings.seen.payload_kg).max()), 1e-9)
+
+    def columns(doings: Doings) -> list[Column]:
+        waves = np.cos(doings.active @ direction[: WAVES // 2].T + phase[: WAVES // 2])
+        waves *= doings.seen.payload_kg[:, None] / most
+        return [[(Slot(Part.BASE, 0, 3 + k), waves[:, w])] for w in range(WAVES // 2) for k in range(3)]
+
+    names = tuple(f"wave_{w}_{k}" for w in range(WAVES // 2) for k in range(3))
+    return Candidate(Place(LOAD, variable="payload"), "", names, columns, 1, (LENGTH,) * len(names))

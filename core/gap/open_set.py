@@ -1,0 +1,213 @@
+"""Named, mixed, or unknown: what the search found, held against smooth functions without a name.
+
+Evidence prefers a flexible stand-in over a slightly wrong name as soon as the noise is small, so it does not decide.
+What decides is how much of what could be explained at all a name explains on points kept out of the fit: locally,
+against functions of the same variable, and globally, against functions of everything.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from core.gap.evidence import Chosen, Evidence, joined
+from core.gap.kept_out import KeptOut
+from core.gap.problem import Problem
+from core.gap.result import Place
+
+LEAST_SHARE = 0.05
+"""Of the gap: what closes less is an imperfection of a stronger cause, or clutter."""
+LOCALLY, GLOBALLY = 0.92, 0.75
+"""Shares of what nameless functions close that a name must close to stand."""
+WEAKER = 0.10
+"""Of what is closed at one place: the second name there must close so much."""
+MOST_NAMELESS = 3
+COMPLETED = frozenset({"thermal", "drift", "axis_wobble", "linkage", "payload", "compliance", "flexure", "hysteresis"})
+"""Effects whose forms are rough: several of one place describe it together."""
+BY_TIME = frozenset({"drift", "base_shift", "target_slip", "thermal"})
+BY_LOAD = frozenset({"compliance", "flexure", "payload"})
+EVERYWHERE = frozenset({"scale", "latency", "quantisation"})
+
+
+@dataclass(frozen=True)
+class Stand:
+    """What is said of one place: a name, or that something acts there."""
+
+    place: Place
+    groups: tuple[int, ...]
+    """Candidates that describe it; nameless ones of an unknown."""
+    sizes: tuple[float, ...]
+    local: float
+    """Share of what nameless functions of the same variable close."""
+
+    @property
+    def unknown(self) -> bool:
+        return self.place.effect == "unknown"
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Everything needed to weigh names against nameless functions."""
+
+    problem: Problem
+    evidence: Evidence
+    fold: np.ndarray
+    geometry_prior: float
+    threshold: float
+    floor_m2: float
+    found: Chosen
+    given: Chosen = Chosen()
+    """Geometry that needs no judgement: it is there whatever else is."""
+
+    @property
+    def everything(self) -> Chosen:
+        return joined(self.given, self.found)
+
+    @cached_property
+    def local(self) -> dict[str, Chosen]:
+        """Nameless functions of each variable that matters, given nothing else."""
+        return {key: self._nameless(self.given, members, len(members)) for key, members in self._variables.items()}
+
+    @cached_property
+    def _variables(self) -> dict[str, np.ndarray]:
+        out: dict[str, list[int]] = {}
+        for k in self.problem.nameless:
+            place = self.problem.candidates[k].place
+            key = f"joint {place.joint}" if place.joint is not None else str(place.variable)
+            out.setdefault(key, []).append(int(k))
+        return {key: np.array(members) for key, members in out.items()}
+
+    @cached_property
+    def rest(self) -> Chosen:
+        """Nameless functions that add to all names together."""
+        return self._nameless(self.everything, self.problem.nameless, MOST_NAMELESS)
+
+    @cached_property
+    def lone(self) -> Chosen:
+        """The best nameless functions when no name is given."""
+        return self._nameless(self.given, self.problem.nameless, MOST_NAMELESS)
+
+    @cached_property
+    def kept_out(self) -> KeptOut:
+        groups = dict.fromkeys(self.everything.groups)
+        for chosen in (self.rest, self.lone, *self.local.values()):
+            groups |= dict.fromkeys(chosen.groups)
+        return KeptOut(self.problem, self.fold, self.geometry_prior, tuple(groups))
+
+    @cached_property
+    def base_m2(self) -> float:
+        """Mean square residual with placement and geometry alone."""
+        return self.square(Chosen())
+
+    @cached_property
+    def bare_m2(self) -> float:
+        """Mean square residual with placement and small geometry alone."""
+        return self.kept_out.square_m2(Chosen())
+
+    @cached_property
+    def closable_m2(self) -> float:
+        return max(self.base_m2 - self.floor_m2, 1e-3 * self.floor_m2)
+
+    def square(self, chosen: Chosen) -> float:
+        """With the geometry that is given."""
+        return self.kept_out.square_m2(joined(self.given, chosen))
+
+    def variable(self, place: Place) -> str:
+        """The variable whose nameless functions rival a cause."""
+        if place.effect in BY_TIME:
+            return "time"
+        if place.joint is not None:
+            return f"joint {place.joint}"
+        if place.frame is not None:
+            return f"joint {place.frame + 1}"
+        if place.effect == "payload" and "payload" in self._variables:
+            return "payload"
+        return "configuration"
+
+    def _nameless(self, given: Chosen, among: np.ndarray, most: int) -> Chosen:
+        added = Chosen()
+        while len(added.groups) < most:
+            left = np.array([g for g in among if g not in added.groups], dtype=int)
+            if not len(left):
+                break
+            gains = self.evidence.gains(left, joined(given, added))
+            best = int(np.argmax(gains.evidence))
+            if not gains.evidence[best] > self.threshold:
+                break
+            added = added.plus(int(left[best]), float(gains.size[best]))
+        return added
+
+
+def stands(judge: Judge) -> list[Stand]:
+    """What can be said of each place where something acts, strongest first."""
+    kept = _worth_naming(judge, judge.found)
+    out = []
+    by_variable: dict[str, list[int]] = {}
+    for k, group in enumerate(kept.groups):
+        by_variable.setdefault(judge.variable(judge.problem.candidates[group].place), []).append(k)
+    for variable, members in by_variable.items():
+        out += _at(
+            judge, variable, _pick(kept, members), _pick(kept, [k for k in range(len(kept.groups)) if k not in members])
+        )
+    return out
+
+
+def _worth_naming(judge: Judge, chosen: Chosen) -> Chosen:
+    """What is left when candidates that close next to nothing, given the others, are dropped one by one."""
+    while chosen.groups:
+        whole = judge.square(chosen)
+        lost = [judge.square(chosen.without(k)) - whole for k in range(len(chosen.groups))]
+        least = int(np.argmin(lost))
+        if lost[least] >= LEAST_SHARE * judge.closable_m2:
+            break
+        chosen = chosen.without(least)
+    return chosen
+
+
+def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen) -> list[Stand]:
+    """Names at one variable, or that it is unknown what acts there."""
+    without = judge.square(elsewhere)
+    local = judge.local.get(variable, Chosen())
+    ceiling = without - min(judge.square(joined(elsewhere, here, local)), judge.square(joined(elsewhere, here)))
+    closes = [without - judge.square(joined(elsewhere, _pick(here, [k]))) for k in range(len(here.groups))]
+    order = list(np.argsort(closes)[::-1])
+    first = order[0]
+    share = closes[first] / max(ceiling, 1e-300)
+    if share >= LOCALLY:
+        return [_stand(judge, here, [first], share)]
+    same = [k for k in order if _place(judge, here, k).same_as(_place(judge, here, first))]
+    if len(same) > 1 and _place(judge, here, first).effect in COMPLETED:
+        together = (without - judge.square(joined(elsewhere, _pick(here, same)))) / max(ceiling, 1e-300)
+        if together >= LOCALLY:
+            return [_stand(judge, here, same, together)]
+    pairs = [k for k in order[1:] if _effect(judge, here, k) != _effect(judge, here, first)]
+    best = max(
+        ((without - judge.square(joined(elsewhere, _pick(here, [first, k]))), k) for k in pairs), default=(0.0, -1)
+    )
+    if best[1] >= 0 and best[0] / max(ceiling, 1e-300) >= LOCALLY and best[0] - closes[first] >= WEAKER * best[0]:
+        together = best[0] / max(ceiling, 1e-300)
+        return [_stand(judge, here, [first], together), _stand(judge, here, [best[1]], together)]
+    if not variable.startswith("joint"):
+        place = Place("unknown", variable=variable)
+    else:
+        place = Place("unknown", joint=int(variable.split()[1]))
+    groups = joined(local, here)
+    return [Stand(place, groups.groups, groups.sizes, share)]
+
+
+def _effect(judge: Judge, chosen: Chosen, k: int) -> tuple[str, int | None]:
+    place = judge.problem.candidates[chosen.groups[k]].place
+    return place.effect, place.source
+
+
+def _place(judge: Judge, chosen: Chosen, k: int) -> Place:
+    return judge.problem.candidates[chosen.groups[k]].place
+
+
+def _pick(chosen: Chosen, which: list[int]) -> Chosen:
+    return Chosen(tuple(chosen.groups[k] for k in which), tuple(chosen.sizes[k] for k in which))
+
+
+def _stand(judge: Judge, chosen: Chosen, which: list[int], local: float) -> Stand:
+    one = _pick(chosen, which)
+    return Stand(judge.problem.candidates[one.groups[0]].place, one.groups, one.sizes, float(min(local, 1.0)))

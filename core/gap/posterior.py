@@ -1,0 +1,50 @@
+"""How probable a name is: against every other candidate at every place, and against there being no name for it.
+
+Evidence is worth what the forms of the effects are worth. A form that is off by a small share of what it explains
+changes the evidence by that share, so differences below it decide nothing.
+"""
+
+import numpy as np
+
+from core.gap.evidence import Chosen, joined
+from core.gap.open_set import LOCALLY, Judge, Stand
+from core.gap.result import Place
+
+FORM_ERROR = 0.004
+"""Share of the evidence that rough forms of effects can be wrong by."""
+NAMED_AT, NAMED_WIDTH = LOCALLY, 0.012
+TWIN_ODDS = 0.05
+"""A candidate at least so probable beside the named one is its twin."""
+
+
+def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, float]]:
+    """Named places with their probabilities, given the other causes, most probable first."""
+    named = judge.problem.named
+    gains = judge.evidence.gains(named, joined(judge.given, others))
+    score = gains.evidence - judge.problem.cost[named]
+    score[np.isin(named, (*judge.given.groups, *others.groups))] = -np.inf
+    places: list[Place] = []
+    best: list[float] = []
+    for k in np.argsort(score)[::-1]:
+        if not np.isfinite(score[k]):
+            continue
+        place = judge.problem.candidates[named[k]].place
+        if not any(place.same_as(known) for known in places):
+            places.append(place)
+            best.append(float(score[k]))
+    odds = np.array(best) - best[0]
+    odds /= np.sqrt(1 + (FORM_ERROR * max(best[0], 0.0)) ** 2)
+    weight = np.exp(odds)
+    return list(zip(places, weight / weight.sum(), strict=True))
+
+
+def has_name(stand: Stand) -> float:
+    """Probability that some name of the library is right, from how much nameless functions would still add."""
+    return float(1 / (1 + np.exp(-(stand.local - NAMED_AT) / NAMED_WIDTH)))
+
+
+def twins(stand: Stand, ranked: list[tuple[Place, float]]) -> tuple[float, tuple[Place, ...]]:
+    """Probability of the place that stands, and the places that the data cannot tell from it, itself first."""
+    mine = next((p for place, p in ranked if place.same_as(stand.place)), 0.0)
+    others = [place for place, p in ranked if not place.same_as(stand.place) and p >= TWIN_ODDS * max(mine, 1e-12)]
+    return mine * has_name(stand), (stand.place, *others[:11])

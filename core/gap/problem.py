@@ -1,0 +1,115 @@
+"""One campaign's residuals with all candidates' columns, ready to be searched."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from core.gap.design import Design, candidate_columns
+from core.gap.doings import Doings
+from core.gap.effects.candidate import Candidate, Column
+from core.gap.effects.structure import geometry_slots
+from core.gap.evidence import Evidence
+from core.gap.gram import Gram, gram
+from core.gap.placement import placement_priors, placement_slots
+from core.gap.sim import Sim, Slot
+from core.gap.whitening import Whitening
+from core.geometry import Array
+
+FREE = 10.0
+"""Prior of base and unknown targets, rad and m: none."""
+NULL_DRAWS, NULL_SEED = 60, 11
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Columns of placement, geometry and candidates; residuals of the placed sim; noise."""
+
+    sim: Sim
+    doings: Doings
+    candidates: tuple[Candidate, ...]
+    design: Design
+    slices: tuple[slice, ...]
+    placement: int
+    """The first so many columns place base and targets."""
+    geometry: int
+    """So many after them change the geometry."""
+    placement_prior: Array
+    residual_m: Array
+    """Real minus sim, (m, 3)."""
+    white: Whitening
+    sums: Gram
+
+    @property
+    def nuisance(self) -> int:
+        return self.placement + self.geometry
+
+    def nuisance_precision(self, geometry_prior: float) -> Array:
+        """Prior precision of placement and of geometry known to so much, rad and m."""
+        free = 1 / np.minimum(self.placement_prior, FREE) ** 2
+        return np.concatenate([free, np.full(self.geometry, 1 / geometry_prior**2)])
+
+    def evidence(self, geometry_prior: float) -> Evidence:
+        return Evidence(self.sums, self.nuisance, self.nuisance_precision(geometry_prior), self.slices)
+
+    @property
+    def cost(self) -> Array:
+        """What having been chosen from several atoms costs each candidate in log evidence."""
+        return np.log([candidate.choices for candidate in self.candidates])
+
+    @property
+    def named(self) -> np.ndarray:
+        return np.array([k for k, c in enumerate(self.candidates) if c.named], dtype=int)
+
+    @property
+    def nameless(self) -> np.ndarray:
+        return np.array([k for k, c in enumerate(self.candidates) if not c.named], dtype=int)
+
+
+def pose_problem(
+    sim: Sim, doings: Doings, candidates: Sequence[Candidate], residual_m: Array, white: Whitening
+) -> Problem:
+    """The columns of all candidates over the points, scaled so that one is one noise standard deviation rms."""
+    placement = placement_slots(sim.seen)
+    geometry = geometry_slots(doings)
+    ones = np.ones(sim.seen.count)
+    nuisance: list[Column] = [[(slot, ones)] for slot in (*placement, *geometry)]
+    columns, sizes, slices = candidate_columns(candidates, doings)
+    start = len(nuisance)
+    slices = [slice(s.start + start, s.stop + start) for s in slices]
+    scale = np.concatenate([np.ones(start), sizes])
+    design = Design(sim, (*nuisance, *columns), scale)
+    sums = gram(design, residual_m, white, NULL_DRAWS, NULL_SEED)
+    unit = _units(sums, slices, start)
+    return Problem(
+        sim,
+        doings,
+        tuple(candidates),
+        Design(sim, design.columns, scale * unit),
+        tuple(slices),
+        len(placement),
+        len(geometry),
+        placement_priors(sim.seen, placement),
+        residual_m,
+        white,
+        replace(
+            sums,
+            square=sums.square * unit[:, None] * unit,
+            pull=sums.pull * unit,
+            null_pulls=sums.null_pulls * unit[:, None],
+        ),
+    )
+
+
+def _units(sums: Gram, slices: list[slice], start: int) -> Array:
+    """Factors that make the columns of each group one noise standard deviation rms."""
+    diagonal = np.diag(sums.square)
+    unit = np.ones(len(diagonal))
+    for group in slices:
+        unit[group] = 1 / np.sqrt(max(diagonal[group].mean() / max(sums.count, 1), 1e-300))
+    unit[:start] = 1.0
+    return unit
+
+
+def slots_of(columns: Sequence[Column]) -> list[Slot]:
+    return [column[0][0] for column in columns]

@@ -1,0 +1,71 @@
+"""Which few named candidates together account for the residuals: one after the other, each reconsidered given the rest."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.gap.evidence import Chosen, Evidence, Gains, joined
+from core.geometry import Array
+
+MOST_CAUSES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The candidates that were chosen, strongest first, and how each stood when nothing was chosen yet."""
+
+    chosen: Chosen
+    alone: Array
+    """Log evidence of each searched candidate standing alone, less the cost of choosing, by candidate; -inf: not searched."""
+    alone_size: Array
+    log_evidence: float
+    """Of all that is chosen, costs included, above placement and geometry alone."""
+
+
+def search(
+    evidence: Evidence,
+    among: np.ndarray,
+    cost: Array,
+    threshold: float,
+    given: Chosen = Chosen(),
+    most: int = MOST_CAUSES,
+) -> Found:
+    """Forward choice with exchange.
+
+    Args:
+        among: candidates to look through.
+        cost: of choosing each candidate, by candidate.
+        threshold: log evidence that noise alone does not reach.
+        given: candidates that are there whatever is found.
+    """
+    alone, alone_size = np.full(len(cost), -np.inf), np.ones(len(cost))
+    chosen = Chosen()
+    while len(chosen.groups) < most:
+        gains, score = _scores(evidence, among, cost, joined(given, chosen))
+        if not chosen.groups:
+            alone[among], alone_size[among] = score, gains.size
+        best = int(np.argmax(score))
+        if not score[best] > threshold:
+            break
+        chosen = chosen.plus(int(among[best]), float(gains.size[best]))
+        if len(chosen.groups) > 1:
+            chosen = _exchanged(evidence, among, cost, chosen, given)
+    total = evidence.given(joined(given, chosen)) - sum(cost[g] for g in chosen.groups)
+    return Found(chosen, alone, alone_size, float(total))
+
+
+def _scores(evidence: Evidence, among: np.ndarray, cost: Array, chosen: Chosen) -> tuple[Gains, Array]:
+    gains = evidence.gains(among, chosen)
+    score = gains.evidence - cost[among]
+    score[np.isin(among, chosen.groups)] = -np.inf
+    return gains, score
+
+
+def _exchanged(evidence: Evidence, among: np.ndarray, cost: Array, chosen: Chosen, given: Chosen) -> Chosen:
+    """Each chosen candidate once reconsidered, the others given."""
+    for _ in range(len(chosen.groups)):
+        rest = chosen.without(0)
+        gains, score = _scores(evidence, among, cost, joined(given, rest))
+        best = int(np.argmax(score))
+        chosen = rest.plus(int(among[best]), float(gains.size[best]))
+    return chosen
