@@ -6,7 +6,7 @@ import numpy as np
 
 from core.base_placement import Placement, place_base
 from core.calibration import Calibration
-from core.geometry import Array, Line, invert
+from core.geometry import Array, Line, invert, transform
 from core.kinematics import link_frames, nominal_net
 from core.live_sweep import LiveSweep, carried_point, expected_point, live_sweep, place_std_at
 from core.phi_model import from_axes
@@ -79,7 +79,21 @@ def base_so_far(state: State) -> Placement:
                 nominal.append(Line(axis[:3, 3], axis[:3, 2]))
                 found.append(so_far.live.fit.line)
                 sliding.append(bool(robot.sliding[joint - 1]))
-    return place_base(nominal, found, sliding)
+    if robot is None or found:
+        return place_base(nominal, found, sliding)
+    return Placement(transform(np.eye(3), _rough_place(state, robot)), False)
+
+
+def _rough_place(state: State, robot: Robot) -> Array:
+    """Where the base may stand as long as no axis is known, (3,): so that the end of the arm is where a target was."""
+    seen = (s for s in reversed(state.shots) if s.counts and s.taken.point_m and state.target_links.get(s.taken.target))
+    shot = next(seen, None)
+    reach = float(np.linalg.norm(robot.link_transforms[:, :3, 3], axis=1).sum())
+    if shot is None:
+        # In front of the instrument, at about its height.
+        return np.array([1.0 + 1.5 * reach, 0.0, -0.5 * reach])
+    frames = link_frames(robot, _net(state, robot, shot.taken.commanded)[None])[0]
+    return np.array(shot.taken.point_m) - frames[state.target_links[shot.taken.target], :3, 3]
 
 
 def base_of(found: Calibration) -> Array | None:

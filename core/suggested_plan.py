@@ -10,6 +10,7 @@ import numpy as np
 from core.robot import Robot
 from core.session_events import TargetEntry
 from core.session_plan import PlannedSweep
+from core.units import displacement_units, to_si
 
 SPAN_RAD, SPAN_M = np.deg2rad(50.0), 0.2
 STOPS = 16
@@ -70,8 +71,8 @@ def held_place(robot: Robot) -> tuple[float, ...] | None:
     inside = (limits[:, 0] <= 0) & (limits[:, 1] >= 0)
     if inside.all():
         return None
-    finite = np.where(np.isfinite(limits), limits, 0.0)
-    return tuple(np.where(inside, 0.0, np.round(finite.mean(axis=1), 3)).tolist())
+    middle = np.where(np.isfinite(limits), limits, 0.0).mean(axis=1)
+    return tuple(np.where(inside, 0.0, [_round(robot, k, at, 1.0) for k, at in enumerate(middle)]).tolist())
 
 
 def _swept(robot: Robot) -> list[int]:
@@ -86,4 +87,10 @@ def _ends(robot: Robot, joint: int, held: float) -> tuple[float, float]:
     low, high = low + margin, high - margin
     span = min(SPAN_M if robot.sliding[joint - 1] else SPAN_RAD, high - low)
     middle = float(np.clip(0.0, low + span / 2, high - span / 2))
-    return float(np.round(middle - span / 2, 4)), float(np.round(middle + span / 2, 4))
+    return _round(robot, joint - 1, middle - span / 2, 0.1), _round(robot, joint - 1, middle + span / 2, 0.1)
+
+
+def _round(robot: Robot, k: int, value: float, unit: float) -> float:
+    """A displacement of joint k (0..) as a person would write it, to a multiple of ``unit`` degrees or millimetres."""
+    scale = to_si(unit, displacement_units(bool(robot.sliding[k]))[0])
+    return float(np.round(value / scale) * scale)

@@ -7,6 +7,7 @@ import pytest
 from session_scenes import demo_session, take
 
 from core.calibration import calibrate
+from core.kinematics import link_frames
 from core.session import Session
 from core.session_campaign import to_campaign
 from core.session_events import Judged, WentTo
@@ -91,3 +92,14 @@ def test_the_axis_is_less_well_known_at_a_far_tool(session: Session) -> None:
     take(session, 12)
     far = sweep_so_far(session.state, 3, 1)
     assert tool_place_std_m(session.state, far) > far.live.fit.point_std_m * far.live.fit.noise_factor
+
+
+def test_before_any_axis_the_arm_is_put_where_its_target_was_seen(session: Session) -> None:
+    before = base_so_far(session.state).base
+    # Out of the instrument, which stands at zero.
+    assert np.linalg.norm(before[:3, 3]) > 1.0
+    take(session, 2)
+    base = base_so_far(session.state).base
+    frames = link_frames(session.state.robot, np.zeros((1, 6)))[0]
+    tool = base[:3, :3] @ frames[6, :3, 3] + base[:3, 3]
+    assert np.linalg.norm(tool - np.array(session.state.shots[-1].taken.point_m)) < 0.3
