@@ -10,6 +10,8 @@ from core.gap.design import Design
 from core.gap.doings import Doings, doings
 from core.gap.effects.candidate import Candidate
 from core.gap.evidence import Chosen, Evidence, joined
+from core.gap.folds import blocks
+from core.gap.kept_out import KeptOut
 from core.gap.library import candidates
 from core.gap.observations import Observations
 from core.gap.placement import place, placement_slots, with_placement
@@ -20,10 +22,12 @@ from core.gap.sim import Sim
 from core.gap.whitening import whitening
 from core.geometry import Array
 
-GEOMETRY_PRIORS = (3e-5, 1e-4, 3e-4, 1e-3, 3e-3)
-"""How well a sim's geometry may be known, rad and m; the data choose."""
-AS_CALIBRATED, CALIBRATED = 1e-4, 1.5e-4
+GEOMETRY_PRIORS = (3e-5, 1e-4)
+"""How well a calibrated sim's geometry may be known, rad and m; the data choose."""
+AS_CALIBRATED, UNCALIBRATED = 1e-4, 3e-3
 """Geometry known so well is what a calibration leaves; beyond, it is itself a cause."""
+GEOMETRY_CLOSES = 0.5
+"""Part of the kept-out mean square that is left at most when the geometry of a whole sim is off."""
 NULL_QUANTILE, NULL_MARGIN = 0.9, 3.0
 """Of the largest evidence that noise alone makes; beyond a quantile it falls off as exp(-x)."""
 MOST_FLEXIBLE = 4
@@ -113,7 +117,7 @@ def analyse(
         white = whitening(noise.covariance_m2, noise.weight, noise.memory)
         problem = pose_problem(sim, told_doings, library, aim, white)
         best = _best_prior(problem)
-        learnt = _learn(told_doings, problem, best, first, told)
+        learnt = _learn(told_doings, problem, best, first, told, steps=turn == 0)
         fresh = [one for one in learnt.sharper if one.place.effect not in without]
         straight = learnt.bent_m2 < BENT**2 * noise.floor_m2.mean()
         settled = _settled(noise, learnt.noise) and not _new(fresh, library) and straight
@@ -178,20 +182,27 @@ def _rescaled(covariance: Array, variance: float) -> Array:
 
 def _best_prior(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
     """The geometry prior under which everything together is most probable, and what is found with it."""
-    best = None
-    for prior in GEOMETRY_PRIORS:
-        evidence = problem.evidence(prior)
-        threshold = null_threshold(problem, evidence)
-        found = search(evidence, problem.named, problem.cost, threshold)
-        total = found.log_evidence + evidence.nuisance_evidence
-        if best is None or total > best[0]:
-            best = (total, evidence, prior, threshold, found)
-        elif prior > 2 * best[2]:
-            break
-    assert best is not None
-    if best[2] <= CALIBRATED:
-        return (*best[1:], Chosen())
-    return _with_geometry(problem)
+    if _geometry_is_off(problem):
+        return _with_geometry(problem)
+    tried = [_with_prior(problem, prior) for prior in GEOMETRY_PRIORS]
+    _, *best = max(tried, key=lambda one: one[0])
+    return (*best, Chosen())
+
+
+def _with_prior(problem: Problem, prior: float) -> tuple[float, Evidence, float, float, Found]:
+    evidence = problem.evidence(prior)
+    threshold = null_threshold(problem, evidence)
+    found = search(evidence, problem.named, problem.cost, threshold)
+    return found.log_evidence + evidence.nuisance_evidence, evidence, prior, threshold, found
+
+
+def _geometry_is_off(problem: Problem) -> bool:
+    """Whether changes of geometry beyond what a calibration leaves predict points that they were not fitted to."""
+    fold = blocks(problem.sim.seen)
+    closely, freely = (
+        KeptOut(problem, fold, prior, ()).square_m2(Chosen()) for prior in (GEOMETRY_PRIORS[-1], UNCALIBRATED)
+    )
+    return freely < GEOMETRY_CLOSES * closely
 
 
 def null_threshold(problem: Problem, evidence: Evidence) -> float:
@@ -225,8 +236,13 @@ def _learn(
     best: tuple[Evidence, float, float, Found, Chosen],
     first: NoiseFound,
     only: Callable[[Candidate], bool] | None,
+    steps: bool,
 ) -> Learnt:
-    """What a flexible fit says of the noise, sharper atoms, and residuals about the fitted state."""
+    """What a flexible fit says of the noise, sharper atoms, and residuals about the fitted state.
+
+    Args:
+        steps: whether steps of encoders are looked for.
+    """
     evidence, prior, threshold, found, given = best
     everything = joined(given, found.chosen)
     named_left, own = _left(problem, evidence, prior, everything)
@@ -235,9 +251,10 @@ def _learn(
     scale = 3 * noise.weight / np.trace(noise.covariance_m2, axis1=1, axis2=2)
     chosen = [problem.candidates[g] for g in everything.groups]
     better = sharpened(problem.sim, told, chosen, named_left, own, scale)
-    bare, _ = _left(problem, evidence, prior, given)
-    for aim in (named_left, bare):
-        better += encoder_steps(problem.sim, told, aim, scale)
+    if steps or noise.excess > 1:
+        bare, _ = _left(problem, evidence, prior, given)
+        for aim in (named_left, bare):
+            better += encoder_steps(problem.sim, told, aim, scale)
     if only is not None:
         better = [one for one in better if only(one)]
     state = joined(given, Chosen(found.chosen.groups[:1], found.chosen.sizes[:1]))

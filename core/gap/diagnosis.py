@@ -287,7 +287,7 @@ def _noise_model(campaign: Campaign, found: Findings) -> NoiseModel:
 
 def _causes(found: Findings) -> tuple[Cause, ...]:
     """Every cause with what it closes: alone, in its turn, and last."""
-    judge, kept = found.judge, found.kept
+    kept = found.kept
     total = max(found.gap_m2 - found.floor_m2, 1e-3 * found.floor_m2)
     base = kept.square_m2(Chosen())
     so_far, before, out = Chosen(), base, []
@@ -331,7 +331,7 @@ def _parameters(found: Findings, stand: Stand) -> tuple[Parameter, ...]:
     if stand.unknown:
         return ()
     problem = found.analysis.problem
-    index, numbers, covariance = found.kept.fitted(found.chosen)
+    _, numbers, covariance = found.kept.fitted(found.chosen)
     at = _position(found, found.chosen, stand.groups[0])
     candidate = problem.candidates[stand.groups[0]]
     scale = problem.design.scale[problem.slices[stand.groups[0]]]
@@ -372,14 +372,14 @@ def _rivals(found: Findings, causes: tuple[Cause, ...]) -> tuple[Rivals, ...]:
 
 def _evidence_map(found: Findings) -> tuple[Cell, ...]:
     """Every named effect and place when it stands alone, for those that say anything."""
-    a = found.analysis
+    a, best = found.analysis, _best_closure(found)
     total = max(2 * float(np.max(a.found.alone, initial=0.0)), 1e-300)
     cells: dict[tuple[object, ...], Cell] = {}
     for k in a.problem.named:
         place, score = a.problem.candidates[k].place, float(a.found.alone[k])
         key = (place.effect, place.joint, place.source, place.frame, place.target)
         if np.isfinite(score) and (key not in cells or score > cells[key].evidence):
-            closed = min(max(2 * score / total, 0.0), 1.0) * _best_closure(found)
+            closed = min(max(2 * score / total, 0.0), 1.0) * best
             cells[key] = Cell(place, score, closed)
     return tuple(cells.values())
 
@@ -395,7 +395,7 @@ def _best_closure(found: Findings) -> float:
 def _corrected(arm: CalibratedArm | None, found: Findings) -> CorrectedSim:
     a = found.analysis
     problem = a.problem
-    index, numbers, _ = found.kept.fitted(found.chosen)
+    _, numbers, _ = found.kept.fitted(found.chosen)
     scaled = numbers * np.concatenate(
         [
             problem.design.scale[: problem.nuisance],

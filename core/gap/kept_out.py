@@ -1,5 +1,6 @@
 """How well models predict points that they have not seen, fold by fold."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -39,6 +40,17 @@ class KeptOut:
         return (self.problem.white.weight > 0) | (self.fold == CHECK)
 
     @cached_property
+    def _plain_sums(self) -> tuple[Array, Array, Array]:
+        """Squares, pulls and totals of the judged points of each fold, without weights."""
+        u = self.plain.shape[2]
+        squares, pulls, totals = np.zeros((CHECK + 1, u, u)), np.zeros((CHECK + 1, u)), np.zeros(CHECK + 1)
+        for f in range(CHECK + 1):
+            mine = (self.fold == f) & self.judged
+            flat, aim = self.plain[mine].reshape(-1, u), self.problem.residual_m[mine].ravel()
+            squares[f], pulls[f], totals[f] = flat.T @ flat, flat.T @ aim, aim @ aim
+        return squares, pulls, totals
+
+    @cached_property
     def _sums(self) -> tuple[Array, Array]:
         """Whitened squares and pulls of each fold, (folds, u, u) and (folds, u)."""
         white = self.problem.white
@@ -63,31 +75,34 @@ class KeptOut:
         prior = [np.full(widths[g], 1 / s**2) for g, s in zip(chosen.groups, chosen.sizes, strict=True)]
         return index, np.concatenate([self.problem.nuisance_precision(self.geometry_prior), *prior])
 
-    def left_m(self, chosen: Chosen, geometry: bool = True) -> Array:
-        """Residuals of every point, predicted from the other folds, (m, 3).
-
-        Args:
-            geometry: False: the geometry stays the sim's; only base and targets are placed.
-        """
-        index, prior = self.index(chosen)
-        if not geometry:
-            keep = np.ones(len(index), dtype=bool)
-            keep[self.problem.placement : self.problem.nuisance] = False
-            index, prior = index[keep], prior[keep]
-        squares, pulls = self._sums
+    def left_m(self, chosen: Chosen) -> Array:
+        """Residuals of every point, predicted from the other folds, (m, 3)."""
+        index, _ = self.index(chosen)
         out = np.empty_like(self.problem.residual_m)
-        whole, pull = squares[:CHECK].sum(axis=0), pulls[:CHECK].sum(axis=0)
-        for f in np.unique(self.fold):
-            square = whole - squares[f] if f != CHECK else whole
-            right = pull - pulls[f] if f != CHECK else pull
-            numbers = np.linalg.solve(square[np.ix_(index, index)] + np.diag(prior), right[index])
+        for f, numbers in self._by_fold(chosen):
             mine = self.fold == f
             out[mine] = self.problem.residual_m[mine] - self.plain[mine][:, :, index] @ numbers
         return out
 
-    def square_m2(self, chosen: Chosen, geometry: bool = True) -> float:
-        """Mean square length of those residuals, m^2."""
-        return mean_square(self.left_m(chosen, geometry)[self.judged])
+    def square_m2(self, chosen: Chosen) -> float:
+        """Mean square length of those residuals over the points that count, m^2."""
+        index, _ = self.index(chosen)
+        squares, pulls, totals = self._plain_sums
+        sum_m2 = sum(
+            totals[f] - 2 * pulls[f, index] @ numbers + numbers @ squares[f][np.ix_(index, index)] @ numbers
+            for f, numbers in self._by_fold(chosen)
+        )
+        return float(max(sum_m2, 0.0) / max(np.count_nonzero(self.judged), 1))
+
+    def _by_fold(self, chosen: Chosen) -> Iterator[tuple[int, Array]]:
+        """Each fold with the estimates from all others."""
+        index, prior = self.index(chosen)
+        squares, pulls = self._sums
+        whole, pull = squares[:CHECK].sum(axis=0), pulls[:CHECK].sum(axis=0)
+        for f in np.unique(self.fold):
+            square = whole - squares[f] if f != CHECK else whole
+            right = pull - pulls[f] if f != CHECK else pull
+            yield int(f), np.linalg.solve(square[np.ix_(index, index)] + np.diag(prior), right[index])
 
     def fitted(self, chosen: Chosen) -> tuple[np.ndarray, Array, Array]:
         """Columns, estimates and their covariance from all folds together."""

@@ -14,7 +14,7 @@ from core.geometry import Array
 
 FINER = 25
 COARSEST_STEP_RAD, COARSEST_STEP_M = 0.06, 0.02
-SPECTRUM_BINS = 1 << 19
+SPECTRUM_BINS = 1 << 18
 """Over the span of a joint."""
 PEAK = 14.0
 """A line of the spectrum must stand so many times above its neighbourhood."""
@@ -102,7 +102,7 @@ class Spectrum:
         if self.span < 4 * (COARSEST_STEP_M if self.sliding else COARSEST_STEP_RAD) / 3:
             return None
         best = None
-        for k in np.argpartition(self.power, -8)[-8:]:
+        for k in _largest(self.power, 6):
             if self.power[k] > PEAK:
                 found = self.saw_near(2 * self.span / k)
                 best = found if best is None or found[0] > best[0] else best
@@ -122,6 +122,12 @@ class Spectrum:
         return best
 
 
+def _largest(values: Array, count: int) -> np.ndarray:
+    """Places of the largest values."""
+    high = np.flatnonzero(values > 0.5 * values.max(initial=0.0))
+    return high[np.argsort(values[high])[::-1][:count]]
+
+
 def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | None:
     """One size of steps for all turning joints, by the sum of their spectra; None: none stands out."""
     longest = max(spectrum.span for spectrum in spectra)
@@ -133,7 +139,7 @@ def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | No
     if total.max() < PEAK + 2 * len(spectra):
         return None
     best: tuple[float, dict[int, tuple[float, float]]] | None = None
-    for k in np.argpartition(total, -5)[-5:]:
+    for k in _largest(total, 4):
         found = {s.joint: s.saw_near(1 / waves[k]) for s in spectra}
         gain = sum(one[0] for one in found.values())
         if best is None or gain > best[0]:
