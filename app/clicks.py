@@ -14,11 +14,12 @@ if TYPE_CHECKING:
 
 LONGEST_WORD = 64
 HEARD = """<style>div:has(> .ta-ear) + div{display:none}[data-say]{cursor:pointer}
+@keyframes ta-appear{}.ta-appearing{animation:ta-appear 1ms;position:absolute}
 [data-say]:hover,[data-say]:focus-visible{outline:2px solid #D91E8C;outline-offset:-2px}</style>
 <i class='ta-ear' hidden></i>"""
 SAY = (
     "const said=event.target.closest('[data-say]');"
-    "if(said&&(event.type==='click'||event.key==='Enter')){"
+    "if(said&&(event.type!=='keydown'||event.key==='Enter')){"
     "const ear=document.querySelector('div:has(> .ta-ear) + div input');"
     "Object.getOwnPropertyDescriptor(HTMLInputElement.prototype,'value').set.call(ear,said.dataset.say+' '+Date.now());"
     "ear.dispatchEvent(new Event('input',{bubbles:true}))}"
@@ -34,6 +35,11 @@ def saying(word: str, hint: str) -> str:
 def listening(inner: str) -> str:
     """A piece of the page of which elements say words."""
     return f'<div onclick="{SAY}" onkeydown="{SAY}">{inner}</div>'
+
+
+def appearing(word: str) -> str:
+    """Something that nobody sees and that says a word whenever the tab that it is in is opened."""
+    return f"<i class='ta-appearing' data-say='{escape(word)}' onanimationstart=\"{SAY}\"></i>"
 
 
 class Ear:

@@ -47,14 +47,16 @@ class Dashboard:
         Raises:
             InputError: the address cannot be used.
         """
-        self.bench, self.jobs = bench, Jobs(idle=bench.solve_ahead)
+        self.bench, self.jobs = bench, Jobs()
         self.server = _server(host, port)
         self.host, self.port = host, self.server.get_port()
         self.server.gui.configure_theme(**THEME)
         self.seat = Seat(self.server)
+        self.server.on_client_disconnect(lambda client: self.results.tabs.left(client.client_id))
         guard_uploads(self.server, self.seat.may, self._refuse)
         self._dark = False
         self._draw_page()
+        self.jobs.when_idle(self._think_ahead)
         bench.on_change(self.refresh)
 
     def _draw_page(self) -> None:
@@ -171,8 +173,15 @@ class Dashboard:
         first = self.server.initial_camera
         first.position, first.look_at, first.up = (tuple(v) for v in (camera.position_m, camera.look_at_m, camera.up))
 
+    def _think_ahead(self) -> None:
+        """While nobody waits: draw what nobody looks at yet, and have the next solution at hand."""
+        self.results.tabs.catch_up()
+        self.bench.solve_ahead()
+
     def _said(self, client: viser.ClientHandle, word: str) -> None:
         """A finding or a row of a table was clicked: show it where it is, and fly there."""
+        if self.results.tabs.heard(client.client_id, word):
+            return
         self.acquire.heard(SimpleNamespace(client=client), word)
         spot = spot_named(word)
         if spot is None:

@@ -21,9 +21,8 @@ REST_S = 0.3
 class Jobs:
     """A queue of jobs with one worker thread."""
 
-    def __init__(self, idle: Callable[[], None] = lambda: None) -> None:
-        """``idle`` is done by the worker when nothing was asked for a while after the last job."""
-        self._idle = idle
+    def __init__(self) -> None:
+        self._idle: Callable[[], None] = lambda: None
         self._queue: queue.Queue[tuple[Callable[[], None], Report] | None] = queue.Queue()
         self._busy = threading.Event()
         self._worker = threading.Thread(target=self._work, daemon=True, name="trueaxis-jobs")
@@ -33,6 +32,10 @@ class Jobs:
     def busy(self) -> bool:
         """Whether something is being done or waits."""
         return self._busy.is_set() or not self._queue.empty()
+
+    def when_idle(self, think: Callable[[], None]) -> None:
+        """Let the worker do this whenever nothing was asked for a while after a job."""
+        self._idle = think
 
     def ask(self, job: Callable[[], None], report: Report) -> None:
         """Put a job at the end of the queue.

@@ -14,6 +14,7 @@ from app.figures.live import live_figure
 from app.figures.over_time import over_time_figure
 from app.figures.residuals import residual_figure
 from app.figures.transmissions import transmission_figure
+from app.panels.open_tabs import OpenTabs
 from app.panels.plot_box import WIDTH_PX, PlotBox
 from app.table_2 import Limits, table_2
 from app.words import block
@@ -37,20 +38,26 @@ class ResultsPanel:
         self._bench, self._ask = bench, ask
         self.drawn: Calibration | None = None
         self._live_key: tuple | None = None
+        self.tabs = OpenTabs()
         panel = gui.add_panel()
         with panel.add_tab("This sweep"):
+            self.tabs.mark(gui, "live")
             self._live = PlotBox(gui, "live", "Measure a shot to see its residuals here.")
         with panel.add_tab("Residuals"):
+            self.tabs.mark(gui, "residuals")
             self._sweep = gui.add_dropdown("Show", ("-",))
             self._sweep.on_update(lambda event: self._draw_residuals() if event.client else None)
             self._residuals = PlotBox(gui, "residuals", "Solve to see residuals.")
         with panel.add_tab("Drives"):
+            self.tabs.mark(gui, "drives")
             self._curve = gui.add_dropdown("Show", ("-",))
             self._curve.on_update(lambda event: self._draw_curve() if event.client else None)
             self._drive = PlotBox(gui, "drives", "Solve to see what drives and couplings do.")
         with panel.add_tab("Axes"):
+            self.tabs.mark(gui, "axes")
             self._axes = PlotBox(gui, "axes", "Solve to see how well every axis is known.")
         with panel.add_tab("Geometry"):
+            self.tabs.mark(gui, "geometry")
             self._build_geometry(gui)
         self.panel = panel
         """For tabs of others."""
@@ -74,25 +81,18 @@ class ResultsPanel:
 
     def refresh(self) -> None:
         """Draw what has changed."""
-        self._draw_live()
+        self.tabs.draw("live", self._draw_live)
         found = self._bench.calibration
         if found is self.drawn:
             return
         self.drawn = found
-        if found is None:
-            self._forget()
-            return
-        _offer(self._sweep, (*(f.sweep.name for f in found.found.fits), OVER_TIME))
-        _offer(self._curve, tuple(_curves(found)))
-        self._draw_residuals()
-        self._draw_curve()
-        self._axes.show(axis_uncertainty_figure(found, WIDTH_PX))
-        figure = deviations_figure(found)
-        if figure is None:
-            self._deviations.clear()
-        else:
-            self._deviations.show(figure)
-        self._draw_table()
+        if found is not None:
+            _offer(self._sweep, (*(f.sweep.name for f in found.found.fits), OVER_TIME))
+            _offer(self._curve, tuple(_curves(found)))
+        self.tabs.draw("residuals", self._draw_residuals)
+        self.tabs.draw("drives", self._draw_curve)
+        self.tabs.draw("axes", self._draw_axes)
+        self.tabs.draw("geometry", self._draw_geometry)
 
     def _keep_limits(self, event: viser.GuiEvent) -> None:
         asked = {key: box.value for key, box in self._limits.items()}
@@ -109,15 +109,11 @@ class ResultsPanel:
 
     def _draw_table(self) -> None:
         settings = self._bench.state.settings
-        if self.drawn is not None:
+        if self.drawn is None:
+            self._table.content = block("", "table2")
+        else:
             limits = Limits(*(float(settings.get(key, 0.0)) for key in LIMITS))
             self._table.content = table_2(self.drawn, limits)
-
-    def _forget(self) -> None:
-        """Empty, as before the first solution."""
-        for box in (self._residuals, self._drive, self._axes, self._deviations):
-            box.clear()
-        self._table.content = block("", "table2")
 
     def _draw_live(self) -> None:
         state = self._bench.state
@@ -138,6 +134,7 @@ class ResultsPanel:
     def _draw_residuals(self) -> None:
         found = self.drawn
         if found is None:
+            self._residuals.clear()
             return
         names = [f.sweep.name for f in found.found.fits]
         if self._sweep.value in names:
@@ -150,12 +147,27 @@ class ResultsPanel:
         found = self.drawn
         asked = None if found is None else _curves(found).get(self._curve.value)
         if found is None or asked is None:
+            self._drive.clear()
             return
         joint, coupled = asked
         if coupled:
             self._drive.show(coupling_figure(found, joint), coupling_caption(found, joint))
         else:
             self._drive.show(transmission_figure(found, joint), drive_caption(found, joint))
+
+    def _draw_axes(self) -> None:
+        if self.drawn is None:
+            self._axes.clear()
+        else:
+            self._axes.show(axis_uncertainty_figure(self.drawn, WIDTH_PX))
+
+    def _draw_geometry(self) -> None:
+        figure = None if self.drawn is None else deviations_figure(self.drawn)
+        if figure is None:
+            self._deviations.clear()
+        else:
+            self._deviations.show(figure)
+        self._draw_table()
 
 
 def _curves(found: "Calibration") -> dict[str, tuple[int, bool]]:

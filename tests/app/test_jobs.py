@@ -59,8 +59,10 @@ def test_busy_while_something_is_done(jobs):
 def test_the_worker_thinks_ahead_once_after_a_rest(monkeypatch):
     monkeypatch.setattr("app.jobs.REST_S", 0.02)
     thought = threading.Semaphore(0)
-    worker = Jobs(idle=thought.release)
+    worker = Jobs()
+    worker.when_idle(thought.release)
     try:
+        worker.ask(lambda: None, lambda _: None)
         assert thought.acquire(timeout=5)
         assert not thought.acquire(timeout=0.2)
         worker.ask(lambda: None, lambda _: None)
@@ -77,8 +79,10 @@ def test_what_goes_wrong_in_thinking_ahead_stops_nothing(monkeypatch, caplog):
         tried.set()
         raise ZeroDivisionError
 
-    worker = Jobs(idle=wrong)
+    worker = Jobs()
+    worker.when_idle(wrong)
     try:
+        worker.ask(lambda: None, lambda _: None)
         assert tried.wait(5)
         worker.ask(lambda: done.append(1), done.append)
         worker.wait()
