@@ -83,7 +83,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="X,Y,Z",
-        help="where an instrument stands, mm, in the frame of the points, --station=-1,2,3 if X is negative; once for each",
+        help="where an instrument stands, mm, in the frame of the points; once each (--station=-1,2,3 for X below 0)",
     )
     parser.add_argument("--sigma-arcsec", type=_above_zero, metavar="S", help="of the angles of two stations")
     parser.add_argument("--sigma-mm", type=_above_zero, metavar="S", help="of one coordinate of a point")

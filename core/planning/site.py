@@ -73,6 +73,9 @@ class Site:
             raise InputError(f"{len(self.targets)} targets need as many places, and at least one is needed")
         if self.skeleton_m.shape != (n + 1, 3):
             raise InputError(f"a skeleton of {n} joints needs {n + 1} points, got {len(self.skeleton_m)}")
+        for name, values in (("home pose", self.home), ("repeatability of joints", self.repeats.joint_sigma)):
+            if values is not None and np.shape(values) != (n,):
+                raise InputError(f"the {name} needs {n} values, one a joint, got {np.size(values)}")
         if self.coupled is None:
             object.__setattr__(self, "coupled", np.array([c is not None for c in self.state.couplings]))
 

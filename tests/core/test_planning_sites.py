@@ -196,6 +196,10 @@ def test_what_cannot_be_planned_for_is_refused() -> None:
     passive = replace(robot, joints=joints, couplings=(Coupling(1, 2, 1.0),))
     with pytest.raises(InputError, match="joint 2 of ASEA IRB L6 has no motor"):
         nominal_site(passive, np.eye(4), targets_on_links(robot), Sight(sigma_m=1e-4))
+    with pytest.raises(InputError, match="home pose needs 6 values"):
+        replace(drawn_site(), home=np.zeros(5))
+    with pytest.raises(InputError, match="repeatability of joints needs 6 values"):
+        replace(drawn_site(), repeats=Repeats(0.0, np.zeros(3)))
     with pytest.raises(InputError, match="at least one is needed"):
         drawn_site().with_targets((), np.zeros((0, 3)))
 
