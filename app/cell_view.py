@@ -110,8 +110,8 @@ class CellView:
                         view.show(net)
 
     def follow_robot(self) -> None:
-        """Show the arms where the robot is."""
-        self.follow(self._bench.robot.commanded)
+        """Show the arms where the robot is, or where it has to be sent."""
+        self.follow(self._bench.standing)
 
     def show_shots(self) -> None:
         """Show every shot of the session, coloured by verdict; the last one marked."""

@@ -156,6 +156,7 @@ class Dashboard:
     def stop(self) -> None:
         """Close server, worker and session."""
         self.bench.stop()
+        self.seat.close()
         self.jobs.close()
         with contextlib.redirect_stdout(io.StringIO()):
             self.server.stop()

@@ -107,7 +107,7 @@ def verdict_words(so_far: SweepSoFar | None, slides: bool, tool_std_m: float | N
         stated_m: what the instrument promises for one coordinate; None: nothing.
     """
     if so_far is None:
-        return block("<p class='soft'>No shot yet. Press <b>Measure</b>, or let the robot run.</p>", "verdict")
+        return block("<p class='soft'>No shot yet. Press <b>Measure</b>.</p>", "verdict")
     live, count = so_far.live, len(so_far.shots)
     if not count:
         return block("<p class='soft'>No shot of this sweep shows its axis yet. Press <b>Measure</b>.</p>", "verdict")

@@ -413,6 +413,12 @@ class Workbench:
         step, base = self.state.next_step, self.base()
         return None if step is None else expected_place(self.state, step, base.base if base.settled else None)
 
+    @property
+    def standing(self) -> tuple[float, ...]:
+        """Commands at which the arm is drawn, (n,): where the robot was sent, or where a person has to send it next."""
+        step = self.state.next_step
+        return self.robot.commanded if self.rig.moves_itself or step is None else step.commanded
+
     def aims(self, expected: Expected | None) -> tuple[str, ...]:
         """How each theodolite is to be aimed at an expected place, in sentences; none for other instruments."""
         if expected is None or self.rig.theodolites is None:

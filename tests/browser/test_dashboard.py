@@ -188,7 +188,8 @@ def test_one_browser_acts_and_the_other_watches(chromium, dashboard, page):
         assert dashboard.bench.state.shots == ()
         measure(page, 1)
         wait_for_text(watcher, "step", "stop 2 of 17")
-        press(watcher, "Take the operator's seat")
+        press(watcher, "Ask for the operator's seat")
+        press(page, "Give the seat")
         wait_for_text(watcher, "seat", "You hold the operator's seat")
         measure(watcher, 1)
         assert len(dashboard.bench.state.shots) == 2
@@ -251,7 +252,8 @@ def test_check_the_instrument_then_begin_a_new_session(page, dashboard):
     measure(page, 2)
     first = dashboard.bench.session.path.name
     tab(page, "1 Cell")
-    group(page, "New")
+    page.get_by_text("New session", exact=True).filter(visible=True).last.click()
+    press(page, "Begin")
     page.wait_for_function(
         "first => !document.querySelector('[data-testid=cell]').innerText.includes(first)", arg=first
     )
