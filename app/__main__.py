@@ -27,6 +27,7 @@ COMMANDS = {
     "compensate": "find the commands that make the calibrated arm take given poses",
     "gap": "why simulated and real arm differ: where, which effects, how far that shrinks, what to measure next",
     "blind-check": "diagnose a folder of campaigns blind, then score what was said against answers.json",
+    "compare": "this project's methods and the literature's on the same simulated arm",
     "export": "the calibrated robot for other tools: URDF, MJCF, Denavit-Hartenberg rows, JSON",
 }
 

@@ -177,17 +177,6 @@ class Comparison:
         if self.trials < 1 or not self.rows:
             raise InputError(f"a comparison needs trials and methods, got {self.trials} and {len(self.rows)}")
 
-    @property
-    def best_own(self) -> MethodRow:
-        """The best of this project's own methods, by the mean position error."""
-        return min((row for row in self.rows if row.own), key=lambda row: row.position_m.mean)
-
-    @property
-    def better(self) -> tuple[MethodRow, ...]:
-        """Methods with a smaller mean position error than the best own one, beyond what the trials' luck explains."""
-        own = self.best_own
-        return tuple(row for row in self.rows if not row.own and _less(row.position_m, own.position_m))
-
 
 @dataclass(frozen=True)
 class _Outcome:
@@ -292,7 +281,7 @@ def _row(method: Method, outcomes: list[_Outcome | None], points: int) -> Method
     )
 
 
-def _less(one: ErrorSizes, other: ErrorSizes) -> bool:
-    """Whether a mean is smaller by more than two standard errors of the difference."""
+def smaller(one: ErrorSizes, other: ErrorSizes) -> bool:
+    """Whether a mean is smaller than another by more than two standard errors of the difference."""
     slack = 2 * np.sqrt(np.nan_to_num(one.mean_std) ** 2 + np.nan_to_num(other.mean_std) ** 2)
     return one.mean < other.mean - slack

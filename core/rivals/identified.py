@@ -6,8 +6,7 @@ import numpy as np
 
 from core.arm import Arm
 from core.arm_jacobian import ArmState
-from core.calibrated_arm import CalibratedArm, in_robot_base
-from core.calibration import calibrated_robot
+from core.calibrated_arm import CalibratedArm, assembled_arm
 from core.drives import offsets
 from core.estimate import ArmEstimate, Geometry
 from core.measurements import Campaign
@@ -48,7 +47,7 @@ def calibrated_arm_of(arm: Arm, campaign: Campaign) -> CalibratedArm:
     robot, convention = campaign.robot, convention_of(campaign.robot)
     n = robot.joint_count
     base, model = from_axes(arm.axes, convention)
-    unknown = np.full((4 * (n - 1), 4 * (n - 1)), np.nan)
+    parameters = 4 * (n - 1)
     estimate = ArmEstimate(
         method="",
         arm=arm,
@@ -56,19 +55,9 @@ def calibrated_arm_of(arm: Arm, campaign: Campaign) -> CalibratedArm:
         transmissions=(None,) * n,
         offset_std=np.full(n, np.nan),
         couplings=(None,) * n,
-        geometry=Geometry(base, model, np.full((n - 1, 4), np.nan), unknown),
+        geometry=Geometry(base, model, np.full((n - 1, 4), np.nan), np.full((parameters, parameters), np.nan)),
         noise_m=np.nan,
     )
-    chain = calibrated_robot(robot, convention, from_axes(robot.axes_at_zero(), convention)[1], estimate)
-    frame, hung = in_robot_base(robot, convention, chain, base)
-    return CalibratedArm(
-        nominal=robot,
-        robot=hung,
-        drives=arm,
-        base=frame,
-        targets=(),
-        noise_m=np.nan,
-        home=campaign.home,
-        source=campaign.title,
-        digest=campaign.digest,
-    )
+    nominal = from_axes(robot.axes_at_zero(), convention)[1]
+    unknown = np.full((len(campaign.targets), 3), np.nan), np.full((len(campaign.targets), 3, 3), np.nan)
+    return assembled_arm(campaign, convention, nominal, estimate, unknown)
