@@ -7,6 +7,7 @@ base stands to that frame, and it stands so to frame 1 of the real axes as well.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -59,11 +60,19 @@ class CalibratedArm:
     """SHA-256 of that campaign's files."""
 
     def driven(self) -> DrivenRobot:
-        """Calibrated chain and drives, for inverse kinematics in the robot's base frame."""
-        return DrivenRobot(self.robot, self.drives)
+        """Calibrated chain and drives, for inverse kinematics in the robot's base frame; the same one every time."""
+        return self._driven
 
     def nominal_driven(self) -> DrivenRobot:
         """The same of the nominal robot."""
+        return self._nominal_driven
+
+    @cached_property
+    def _driven(self) -> DrivenRobot:
+        return DrivenRobot(self.robot, self.drives)
+
+    @cached_property
+    def _nominal_driven(self) -> DrivenRobot:
         return nominal_driven(self.nominal)
 
 

@@ -1,8 +1,9 @@
 """Which joint displacements bring the tool to a pose: every branch, or the one nearest to a given configuration.
 
-Damped least squares (``core/pose_iteration.py``) from several starts (``core/pose_seeds.py``), thousands of poses at
-once, for any arm: parallel axes, slides, joints driven by others, more or fewer joints than six. What cannot be is said
-and never bent: a pose is
+Damped least squares (``core/pose_iteration.py``), thousands of poses at once, for any arm: parallel axes, slides,
+joints driven by others, more or fewer joints than six. It starts from all answers in closed form where the arm, or one
+very near to it, has them (``core/closed_form.py``), else from several configurations out of a table
+(``core/pose_seeds.py``). What cannot be is said and never bent: a pose is
 
     solved          reached, within the limits of the commands
     beyond limits   reached by branches all of which break a limit
@@ -16,6 +17,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from core.closed_form import ClosedForm, closed_form
 from core.driven_robot import LIMIT_SLACK, DrivenRobot
 from core.errors import InputError
 from core.geometry import Array
@@ -25,6 +27,8 @@ from core.pose_seeds import EXHAUSTIVE, QUICK, THOROUGH, Effort, joint_distance,
 SINGULAR = 1e-6
 """Smallest singular value of the scaled Jacobian at which a pose counts as singular: a micrometre or a microradian of
 the tool is then a radian at some joint."""
+LOOSE = 1e-3
+"""Below this the joints may be moved far without moving the tool by much."""
 SAME_RAD = 1e-3
 """Solutions that differ by less at every joint are one."""
 SAME_BRANCH_RAD = 0.35
@@ -122,7 +126,11 @@ def inverse_kinematics(
     if near.shape not in ((n,), (m, n)) or not np.isfinite(near).all():
         raise InputError(f"the configuration to be near to needs {n} finite numbers a pose, got shape {near.shape}")
     search = _Search(robot, poses, np.broadcast_to(near, (m, n)), tolerance)
-    search.from_near(accept=near.ndim == 2)
+    form = closed_form(robot)
+    if near.ndim == 2 or form is None:
+        search.from_near(accept=near.ndim == 2)
+    if form is not None:
+        search.from_answers(form)
     for limited, effort in ((True, QUICK), (True, THOROUGH), (False, THOROUGH)):
         search.explore(limited, effort)
     search.finish()
@@ -140,6 +148,7 @@ def all_branches(robot: DrivenRobot, poses: ArrayLike, effort: Effort = EXHAUSTI
     for first in range(0, len(poses), CHUNK):
         chunk = poses[first : first + CHUNK]
         found = [_found(robot, chunk, limited, effort) for limited in (True, False)]
+        found.append(_answered(robot, chunk))
         kept = _distinct(robot, *(np.concatenate(part) for part in zip(*found, strict=True)))
         parts.append((kept[0] + first, kept[1]))
     pose = np.concatenate([part[0] for part in parts])
@@ -150,10 +159,21 @@ def all_branches(robot: DrivenRobot, poses: ArrayLike, effort: Effort = EXHAUSTI
 
 def smallest_singular(robot: DrivenRobot, net: Array) -> Array:
     """Smallest singular value of the Jacobian by the free displacements, positions in units of the reach, (m,)."""
-    jacobian = np.moveaxis(scaled_jacobian(robot, chain_state(robot, net)), 2, 0)
-    slopes = robot.slopes(net[:, robot.free])
-    jacobian = jacobian[:, :, robot.free] if slopes is None else jacobian @ slopes
-    return np.linalg.svd(jacobian, compute_uv=False)[:, -1] if len(net) else np.empty(0)
+    return np.linalg.svd(_by_free(robot, net), compute_uv=False)[:, -1] if len(net) else np.empty(0)
+
+
+def is_singular(robot: DrivenRobot, net: Array, below: float = SINGULAR) -> np.ndarray:
+    """Where the smallest singular value is below a bound, boolean (m,); quick where it is far above."""
+    jacobian = _by_free(robot, net)
+    suspect = np.ones(len(net), dtype=bool)
+    if len(net) and jacobian.shape[1] == jacobian.shape[2]:
+        # The determinant is the product of all singular values, none of which exceeds the matrix's own size.
+        size = np.sqrt(np.einsum("mij,mij->m", jacobian, jacobian))
+        suspect = np.abs(np.linalg.det(jacobian)) < below * size ** (jacobian.shape[1] - 1)
+    out = np.zeros(len(net), dtype=bool)
+    if suspect.any():
+        out[suspect] = np.linalg.svd(jacobian[suspect], compute_uv=False)[:, -1] < below
+    return out
 
 
 def in_limits(robot: DrivenRobot, net: Array, near: Array) -> Array:
@@ -188,6 +208,50 @@ class _Search:
         slides, reach = self._robot.chain.sliding, self._robot.reach_m
         close = joint_distance(self._net, self._near, slides, reach) < SAME_BRANCH_RAD
         self._settled = (self._grade < GRADES.index(Outcome.UNREACHABLE)) & close & accept
+
+    def from_answers(self, form: ClosedForm) -> None:
+        """Start from answers in closed form: the most promising one of each pose, then all others that may be better.
+
+        Where they are exact, they are all that there is: a pose that none of them solves is not looked for elsewhere,
+        unless it is singular.
+        """
+        rows = np.flatnonzero(~self._settled)
+        for first in range(0, len(rows), CHUNK):
+            chunk = rows[first : first + CHUNK]
+            order, away = self._ranked(chunk, form)
+            self._start(chunk, order[:, 0], QUICK.steps, QUICK.bent)
+            solved = self._grade[chunk] == 0
+            rival = away[:, 1:].min(axis=1) < self._cost[chunk] + form.slack_rad
+            self._settled[chunk] = solved & ~rival
+            again = np.flatnonzero(~self._settled[chunk])
+            others = order[again, 1:].reshape(-1, order.shape[2])
+            self._start(np.repeat(chunk[again], order.shape[1] - 1), others, THOROUGH.steps, THOROUGH.bent)
+            self._settled[chunk] = self._grade[chunk] == 0
+            if form.slack_rad == 0:
+                self._settled[chunk] |= (self._grade[chunk] > 1) & ~self._loose(chunk)
+
+    def _ranked(self, rows: np.ndarray, form: ClosedForm) -> tuple[Array, Array]:
+        """Answers for poses, the most promising first, (r, 8, n), and how far each is from where to look, (r, 8).
+
+        An answer promises much if it leads to the pose, keeps the limits, and is near; others are infinitely far.
+        """
+        answers = form.answers(self._poses[rows])
+        r, count, n = answers.shape
+        each = np.repeat(rows, count)
+        net = in_limits(self._robot, answers.reshape(-1, n), self._near[each])
+        position, rotation = self._errors(each, net)
+        missed = (position / self._robot.reach_m + rotation).reshape(r, count)
+        excess = self._robot.excess(self._robot.commands(net)).sum(axis=1).reshape(r, count)
+        away = np.linalg.norm(net - self._near[each], axis=1).reshape(r, count)
+        allowed = form.slack_rad + ALMOST
+        order = np.lexsort((away, excess > allowed, missed > allowed), axis=1)
+        away = np.where((missed > allowed) | (excess > allowed), np.inf, away)
+        net = net.reshape(r, count, n)
+        return np.take_along_axis(net, order[..., None], axis=1), np.take_along_axis(away, order, axis=1)
+
+    def _loose(self, rows: np.ndarray) -> np.ndarray:
+        """Where the best so far leaves joints undetermined: answers in closed form are not all that there is."""
+        return is_singular(self._robot, self._net[rows], LOOSE)
 
     def explore(self, limited: bool, effort: Effort) -> None:
         """Start from the configurations of a table, for all poses that need it."""
@@ -240,7 +304,7 @@ class _Search:
         there = (position <= self._tolerance.position_m) & (rotation <= self._tolerance.rotation_rad)
         excess = self._robot.excess(self._robot.commands(net)).sum(axis=1)
         singular = np.zeros(len(rows), dtype=bool)
-        singular[there] = smallest_singular(self._robot, net[there]) < SINGULAR
+        singular[there] = is_singular(self._robot, net[there])
         grade = np.select([~there, excess > 0, singular], [3, 2, 1], 0)
         scale = np.where(self._robot.chain.sliding, self._robot.reach_m, 1.0)
         away = np.linalg.norm((net - self._near[rows]) / scale, axis=1)
@@ -251,6 +315,13 @@ class _Search:
         missing = misfits(self._robot, chain_state(self._robot, net), wanted)
         position, rotation = np.linalg.norm(missing[:3], axis=0), np.linalg.norm(missing[3:], axis=0)
         return position * self._robot.reach_m, rotation / self._robot.turn_weight
+
+
+def _by_free(robot: DrivenRobot, net: Array) -> Array:
+    """The scaled Jacobian by the free displacements, (m, 6, k)."""
+    jacobian = np.moveaxis(scaled_jacobian(robot, chain_state(robot, net)), 2, 0)
+    slopes = robot.slopes(net[:, robot.free])
+    return np.ascontiguousarray(jacobian[:, :, robot.free] if slopes is None else jacobian @ slopes)
 
 
 def _first_of_each(rows: np.ndarray, order: np.ndarray) -> np.ndarray:
@@ -264,6 +335,17 @@ def _found(robot: DrivenRobot, poses: Array, limited: bool, effort: Effort) -> t
     starts, there = seed_table(robot, limited).starts(poses, effort)
     pose, start = np.nonzero(there)
     end = approach(robot, poses[pose], starts[pose, start], effort.steps, effort.bent)
+    return pose[end.reached], end.free[end.reached]
+
+
+def _answered(robot: DrivenRobot, poses: Array) -> tuple[np.ndarray, Array]:
+    """The same of all answers in closed form; nothing where the arm has none."""
+    form = closed_form(robot)
+    if form is None:
+        return np.empty(0, dtype=np.int64), np.empty((0, len(robot.free)))
+    answers = form.answers(poses)
+    pose = np.repeat(np.arange(len(poses)), answers.shape[1])
+    end = approach(robot, poses[pose], answers.reshape(len(pose), -1), THOROUGH.steps, THOROUGH.bent)
     return pose[end.reached], end.free[end.reached]
 
 

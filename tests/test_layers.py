@@ -44,7 +44,7 @@ RESULTS = """
     core.axis_json core.motion_json core.calibration_json
 """
 USE = """
-    core.driven_robot core.pose_iteration core.pose_seeds core.inverse_kinematics
+    core.driven_robot core.subproblems core.closed_form core.pose_iteration core.pose_seeds core.inverse_kinematics
     core.calibrated_arm core.calibration_file core.pose_files core.compensation core.compensation_effect
     core.rigid_pose core.standstills core.pose_visits core.end_effector
     core.verification core.pose_loop core.repeatability core.verification_json
