@@ -6,7 +6,7 @@ import numpy as np
 
 from app.figures.gap_map import gap_map_figure
 from app.figures.gap_steps import gap_steps_figure
-from app.figures.gap_vectors import gap_vectors_figure, switch_names
+from app.figures.gap_vectors import gap_vectors_figure
 from app.figures.gap_where import gap_records_figure, gap_shares_figure
 from app.figures.reliability import reliability_figure
 from app.gap_tables import (
@@ -18,7 +18,7 @@ from app.gap_tables import (
     shown_transfers,
 )
 from app.report_page import Item, Page, Plot, Section, page_html
-from core.gap.ledger import closed_share
+from core.gap.ledger import closed_share, switches
 from core.gap.place_words import MEANINGS, effect_name
 from core.gap.result import UNKNOWN, GapReport, Verdict
 from core.gap.verdict_words import (
@@ -161,10 +161,8 @@ def _space(report: GapReport) -> Section | None:
     figure = None if report.verdict is Verdict.NO_GAP else gap_vectors_figure(report)
     if figure is None:
         return None
-    caption, names = (
-        "Arrows begin where the sim has a point and end where it was measured, magnified.",
-        switch_names(report),
-    )
+    caption = "Arrows begin where the sim has a point and end where it was measured, magnified."
+    names = tuple(switch.words for switch in switches(report))
     if names:
         caption += " Tick a cause to add it to the sim: what is left of the arrows is what it does not explain."
     text = (_sentence(report.where.worst_region),) if report.where.worst_region else ()

@@ -10,7 +10,7 @@ from core.gap.place_words import cause_words
 from core.gap.result import Cause, GapReport, Rivals
 from core.gap.verdict_words import left_sentence, length_words, next_sentence, percent, verdict_sentence
 
-MOST_NEXT, MOST_WARNINGS, MOST_NAMES = 3, 5, 8
+MOST_CAUSES, MOST_NEXT, MOST_WARNINGS, MOST_NAMES = 8, 3, 5, 8
 
 
 def gap_summary(report: GapReport, folder: Path) -> str:
@@ -25,7 +25,8 @@ def gap_summary(report: GapReport, folder: Path) -> str:
         verdict_sentence(report),
         f"  sim      {report.sim}",
         f"  gap      {gap} -> {left} (floor {floor}), rms over points kept out of the fits",
-        *(line for number, cause in enumerate(report.causes, 1) for line in _cause_lines(number, cause)),
+        *(line for number, cause in enumerate(report.causes[:MOST_CAUSES], 1) for line in _cause_lines(number, cause)),
+        *([f"  and {more} more causes in the report"] if (more := len(report.causes) - MOST_CAUSES) > 0 else []),
         *([f"  left     {left_sentence(report)}"] if report.causes else []),
         *_listed("next", [next_sentence(one) for one in _ranked(report)], MOST_NEXT),
         *_listed("unknown", list(report.warnings), MOST_WARNINGS),

@@ -7,11 +7,13 @@ from app.report_page import Cell, Heading, ShownTable
 from core.gap.ledger import ledger
 from core.gap.parameter_units import shown_limit, shown_parameter
 from core.gap.place_words import NAMES, effect_name, either_of, place_words
-from core.gap.result import Cause, DetectionLimit, GapReport
+from core.gap.result import Cause, DetectionLimit, GapReport, Parameter
 from core.gap.verdict_words import FLOORS, length_words, percent
 from core.wording import decimals_for, fixed, with_uncertainty
 
 MOST_OUTLIERS = 60
+MOST_PARAMETERS = 4
+"""Of one cause, in a cell."""
 NOWHERE = "–"
 SOURCES = {
     "replicates": "repeated measurements",
@@ -115,9 +117,18 @@ def shown_outliers(report: GapReport) -> ShownTable:
 
 
 def cause_parameters(cause: Cause) -> str:
-    """The estimates of a cause in units of people, with their uncertainties."""
-    shown = [shown_parameter(parameter) for parameter in cause.parameters]
-    return "; ".join(f"{one.words} {with_uncertainty(one.value, one.std, one.symbol)}" for one in shown)
+    """The clearest estimates of a cause in units of people, with their uncertainties."""
+    ranked = sorted(range(len(cause.parameters)), key=lambda k: -_clearness(cause.parameters[k]))
+    shown = [shown_parameter(cause.parameters[k]) for k in sorted(ranked[:MOST_PARAMETERS])]
+    words = [f"{one.words} {with_uncertainty(one.value, one.std, one.symbol)}" for one in shown]
+    more = len(ranked) - len(shown)
+    return "; ".join([*words, *([f"{more} more in gap.json"] if more else [])])
+
+
+def _clearness(parameter: Parameter) -> float:
+    """How many standard uncertainties it is from zero; what has none was chosen and comes first."""
+    known = math.isfinite(parameter.std) and parameter.std > 0
+    return abs(parameter.value) / parameter.std if known else math.inf
 
 
 def _cause_row(number_: int, cause: Cause) -> list[Cell]:

@@ -16,6 +16,9 @@ VALUE_PX = 68
 """Of the value behind a bar."""
 LABEL_PX = 7
 """Of one letter of a label, about."""
+SAME = 0.02
+"""Lengths that differ by less are drawn as one."""
+TOGETHER = "All of them fitted together"
 FLOOR_NAMES = {
     "repeats": "Floor: repeated measurements scatter so",
     "sigma": "Floor: the instrument's noise",
@@ -27,6 +30,9 @@ def gap_steps_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure:
     """Rms length of real minus sim on kept-out points, one bar a step, from top to bottom."""
     names = [f"Sim as it is: {report.sim}", *(f"+ {cause_words(cause)}" for cause in report.causes)]
     steps = [report.gap_rms_m, *(cause.gap_after_rms_m for cause in report.causes)]
+    if abs(report.left_rms_m - steps[-1]) > SAME * report.left_rms_m:
+        names.append(TOGETHER)
+        steps.append(report.left_rms_m)
     names = _apart([_lines(name, width_px // 17) for name in [*names, FLOOR_NAMES[report.noise.floor_source]]])
     values = np.array([*steps, report.noise.floor_rms_m]) * 1e3
     colours = [VERMILLION, *([SKY] * (len(steps) - 2)), *([BLUE] if len(steps) > 1 else []), GREY]

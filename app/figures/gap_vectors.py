@@ -1,32 +1,24 @@
 """Real minus sim in space: arrows from where the sim has a point to where it was measured, magnified.
 
-One trace is drawn for every choice of causes that are added to the sim; its ``meta`` says which, so that the page's
-switches show one and hide the others.
+Traces are drawn for every choice of switches, each of which adds a cause to the sim; their ``meta`` says which are on,
+so that the page shows those of one choice and hides the others.
 """
 
 import numpy as np
 import plotly.graph_objects as go
 
 from app.figures.style import BLUE, GREY, LIGHT, SKY, VERMILLION, WIDE_PX, Trace, thinned
-from core.gap.ledger import difference_with
-from core.gap.place_words import cause_words
+from core.gap.ledger import difference_with, switches
 from core.gap.result import GapReport
 from core.gap.verdict_words import length_words
 from core.geometry import Array
 
 MOST_ARROWS, MOST_POINTS = 100, 500
-MOST_SWITCHES = 5
-"""Each doubles the number of traces."""
 LENGTH_SHARE, HEAD_SHARE = 0.12, 0.014
 """Of the size of the cloud of points that the long arrows, and the heads of all, take."""
 HEIGHT_PX = 520
 GRID = "#aab1bb"
 """To be seen on light and on dark pages."""
-
-
-def switch_names(report: GapReport) -> tuple[str, ...]:
-    """What each switch adds to the sim."""
-    return tuple(cause_words(cause) for cause in report.causes[:MOST_SWITCHES])
 
 
 def gap_vectors_figure(report: GapReport, width_px: int = WIDE_PX, shown: int = 0) -> go.Figure | None:
@@ -35,7 +27,7 @@ def gap_vectors_figure(report: GapReport, width_px: int = WIDE_PX, shown: int = 
     Args:
         report: the diagnosis.
         width_px: of the figure.
-        shown: which causes are added to the sim in what is seen first: bit k, cause k.
+        shown: which switches are on in what is seen first: bit k, switch k.
     """
     if len(report.where.worst_rows) == 0:
         return None
@@ -43,10 +35,16 @@ def gap_vectors_figure(report: GapReport, width_px: int = WIDE_PX, shown: int = 
     drawn = report.where.worst_rows
     drawn = drawn[thinned(len(drawn), np.linalg.norm(report.difference_m[drawn], axis=1), MOST_ARROWS)]
     factor = magnification(sim, report.difference_m[drawn])
-    count = len(switch_names(report))
+    head_mm = HEAD_SHARE * float(np.linalg.norm(np.ptp(sim, axis=0))) * 1e3
+    all_switches = switches(report)
     traces = [_dots(sim)]
-    for mask in range(2**count):
-        traces += _arrows(report, sim, drawn, mask, count, factor, mask == shown)
+    for on in range(2 ** len(all_switches)):
+        causes = sum(switch.causes for k, switch in enumerate(all_switches) if on >> k & 1)
+        left = difference_with(report, causes)[drawn]
+        colour = VERMILLION if on == 0 else BLUE if on == 2 ** len(all_switches) - 1 else SKY
+        records = report.campaign.measurements.record[report.rows[drawn]]
+        arrows = _arrows(sim[drawn], left, records, factor, head_mm, colour)
+        traces += [{**trace, "visible": on == shown, "meta": {"mask": on}} for trace in arrows]
     layout = {
         "template": LIGHT,
         "title": {"text": f"<b>Real minus sim in the worst region, × {factor:g}</b>"},
@@ -86,41 +84,36 @@ def _dots(sim_m: Array) -> Trace:
 
 
 def _arrows(
-    report: GapReport, sim_m: Array, drawn: np.ndarray, mask: int, count: int, factor: float, visible: bool
+    start_m: Array, left_m: Array, records: np.ndarray, factor: float, head_mm: float, colour: str
 ) -> list[Trace]:
     """Shafts, parted by gaps, and heads."""
-    left = difference_with(report, mask)[drawn]
-    length = np.linalg.norm(left, axis=1)
-    tips = sim_m[drawn] + factor * left
-    colour = VERMILLION if mask == 0 else BLUE if mask == 2**count - 1 else SKY
-    shown = {"visible": visible, "meta": {"mask": mask}}
-    records = report.campaign.measurements.record[report.rows[drawn]]
+    length = np.linalg.norm(left_m, axis=1)
+    tips = start_m + factor * left_m
     words = [f"record {record}: {one * 1e3:.3f} mm" for record, one in zip(records, length, strict=True)]
     gaps = np.full_like(tips, np.nan)
     shafts = {
         "type": "scatter3d",
-        **_coordinates(np.stack([sim_m[drawn], tips, gaps], axis=1).reshape(-1, 3)),
+        **_coordinates(np.stack([start_m, tips, gaps], axis=1).reshape(-1, 3)),
         "mode": "lines",
         "line": {"color": colour, "width": 4},
-        "name": f"{length_words(float(np.sqrt(np.mean(length**2))))} rms over these {len(drawn)} points",
+        "name": f"{length_words(float(np.sqrt(np.mean(length**2))))} rms over these {len(length)} points",
         "showlegend": True,
         "text": np.repeat(words, 3),
         "hovertemplate": "%{text}<extra></extra>",
     }
-    head = HEAD_SHARE * float(np.linalg.norm(np.ptp(sim_m, axis=0))) * 1e3
-    direction = left / np.maximum(length, 1e-12)[:, None]
+    direction = left_m / np.maximum(length, 1e-12)[:, None]
     heads = {
         "type": "cone",
         **_coordinates(tips),
         **dict(zip("uvw", direction.T.round(4), strict=True)),
         "anchor": "tip",
         "sizemode": "raw",
-        "sizeref": head,
+        "sizeref": head_mm,
         "colorscale": [[0, colour], [1, colour]],
         "showscale": False,
         "hoverinfo": "skip",
     }
-    return [{**shafts, **shown}, {**heads, **shown}]
+    return [shafts, heads]
 
 
 def _coordinates(points_m: Array) -> Trace:

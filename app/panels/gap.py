@@ -8,13 +8,14 @@ import viser
 
 from app.figures.gap_map import gap_map_figure
 from app.figures.gap_steps import gap_steps_figure
-from app.figures.gap_vectors import gap_vectors_figure, switch_names
+from app.figures.gap_vectors import gap_vectors_figure
 from app.figures.gap_where import gap_records_figure
 from app.gap_bench import Diagnosed, GapBench
 from app.gap_view import GapView
 from app.gap_words import causes_words, intro_words, next_words, numbers_words, verdict_words, working_words
 from app.panels.plot_box import WIDTH_PX, PlotBox
 from core.errors import InputError
+from core.gap.ledger import Switch, switches
 from core.gap.result import GapReport
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class GapPanel:
         self._gaps, self._view, self._ask = gaps, view, ask
         self._drawn: Diagnosed | None = None
         self._plotted: Diagnosed | None = None
-        self._switches: list[viser.GuiCheckboxHandle] = []
+        self._switches: list[tuple[Switch, viser.GuiCheckboxHandle]] = []
         self._plots: dict[str, PlotBox] = {}
 
     def build(self, gui: viser.GuiApi) -> None:
@@ -80,7 +81,7 @@ class GapPanel:
             self._numbers.content = "" if found is None else numbers_words(found.report)
             self._causes.content = "" if found is None else causes_words(found.report)
             self._next.content = "" if found is None else next_words(found.report)
-            self._offer_switches(() if found is None else switch_names(found.report))
+            self._offer(() if found is None else switches(found.report))
             self._draw_scene()
         if self._plots and found is not self._plotted:
             self._plotted = found
@@ -92,8 +93,9 @@ class GapPanel:
         self._view.show(None, 0)
 
     @property
-    def _added(self) -> int:
-        return sum(1 << k for k, box in enumerate(self._switches) if box.value)
+    def _on(self) -> int:
+        """Which switches are on: bit k, switch k."""
+        return sum(1 << k for k, (_, box) in enumerate(self._switches) if box.value)
 
     def _diagnose(self, event: viser.GuiEvent) -> None:
         calibrated = self._sim.value == CALIBRATED
@@ -128,33 +130,33 @@ class GapPanel:
         self._bar.value = 100.0 * min(max(done, 0.0), 1.0)
         self._working.content = working_words(text)
 
-    def _offer_switches(self, names: tuple[str, ...]) -> None:
-        for box in self._switches:
+    def _offer(self, offered: tuple[Switch, ...]) -> None:
+        for _, box in self._switches:
             box.remove()
         with self._add:
-            self._switches = [self._gui.add_checkbox(_label(name), False) for name in names]
-        for box in self._switches:
+            self._switches = [(switch, self._gui.add_checkbox(_label(switch.words), False)) for switch in offered]
+        for _, box in self._switches:
             box.on_update(lambda event: self._switched())
-        self._add.visible = bool(names)
+        self._add.visible = bool(offered)
 
     def _switched(self) -> None:
         self._draw_scene()
         found = self._drawn
         if found is not None and "space" in self._plots:
-            self._show("space", gap_vectors_figure(found.report, WIDTH_PX, self._added))
+            self._show("space", gap_vectors_figure(found.report, WIDTH_PX, self._on))
 
     def _draw_scene(self) -> None:
         """Arrows stand among the session's points; those of another campaign have no place there."""
         found = self._drawn
         shown = None if found is None or found.shots is None else found.report
-        self._view.show(shown, self._added)
+        self._view.show(shown, sum(switch.causes for switch, box in self._switches if box.value))
 
     def _draw_plots(self) -> None:
         report = None if self._plotted is None else self._plotted.report
         self._show("steps", report and gap_steps_figure(report, WIDTH_PX))
         caption = "Numbers: the causes of the table; with a question mark: not to be told from it by these data."
         self._show("map", report and gap_map_figure(report, WIDTH_PX), caption)
-        self._show("space", report and gap_vectors_figure(report, WIDTH_PX, self._added))
+        self._show("space", report and gap_vectors_figure(report, WIDTH_PX, self._on))
         self._show("records", report and gap_records_figure(report, WIDTH_PX))
 
     def _show(self, name: str, figure: "go.Figure | None", caption: str = "") -> None:

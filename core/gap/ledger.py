@@ -10,6 +10,8 @@ from core.geometry import Array
 FITTED_TOGETHER = "by fitting all of them together"
 BEYOND, FLOOR = "left, beyond the floor", "floor: noise and the arm's own repeatability"
 NEGLIGIBLE = 1e-6
+MOST_SWITCHES = 5
+"""Their combinations are drawn one by one."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,25 @@ def closed_share(report: GapReport) -> float:
     floor = report.noise.floor_rms_m**2
     gap = report.gap_rms_m**2 - floor
     return 1.0 - (report.left_rms_m**2 - floor) / gap if gap > 0 else math.nan
+
+
+@dataclass(frozen=True)
+class Switch:
+    """Causes that are added to the sim together, by hand."""
+
+    words: str
+    causes: int
+    """Bit k stands for cause k."""
+
+
+def switches(report: GapReport) -> tuple[Switch, ...]:
+    """One switch for every cause; where there are many, the last one stands for all the weaker ones."""
+    count = len(report.causes)
+    alone = count if count <= MOST_SWITCHES else MOST_SWITCHES - 1
+    found = [Switch(cause_words(cause), 1 << k) for k, cause in enumerate(report.causes[:alone])]
+    if alone < count:
+        found.append(Switch(f"the {count - alone} other causes", (1 << count) - (1 << alone)))
+    return tuple(found)
 
 
 def difference_with(report: GapReport, added: int) -> Array:

@@ -13,6 +13,11 @@ FLOORS = {
 }
 
 
+NEAR_FLOOR = 1.25
+MOST_NAMED = 3
+"""Causes that one sentence can hold."""
+
+
 def verdict_sentence(report: GapReport) -> str:
     """What is known of the gap, in one sentence. Texts from files are in it as they are."""
     gap, left, floor = (length_words(v) for v in (report.gap_rms_m, report.left_rms_m, report.noise.floor_rms_m))
@@ -32,7 +37,9 @@ def verdict_sentence(report: GapReport) -> str:
                 f"{_causes(report)} {_takes(report)} the gap from {gap} to {left}; "
                 f"what is left stands out of the noise ({floor}) and has no name."
             )
-    return f"{_causes(report)} {_takes(report)} the gap from {gap} to {left}, which is down to the noise ({floor})."
+    near = report.left_rms_m <= NEAR_FLOOR * report.noise.floor_rms_m
+    end = f"which is down to the noise ({floor})" if near else f"while noise alone would leave {floor}"
+    return f"{_causes(report)} {_takes(report)} the gap from {gap} to {left}, {end}."
 
 
 def length_words(length_m: float) -> str:
@@ -93,7 +100,9 @@ def _chance(p_value: float) -> str:
 
 
 def _causes(report: GapReport) -> str:
-    words = [f"{'an ' if c.place.effect == UNKNOWN else ''}{cause_words(c)}" for c in report.causes]
+    words = [f"{'an ' if c.place.effect == UNKNOWN else ''}{cause_words(c)}" for c in report.causes[:MOST_NAMED]]
+    more = len(report.causes) - len(words)
+    words += [f"{more} other cause{'s' if more > 1 else ''}"] if more else []
     return capital(listed(words)) or "Nothing"
 
 

@@ -3,6 +3,7 @@
 import html
 import json
 import re
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -10,11 +11,13 @@ import pytest
 
 from app.figures.gap_map import gap_map_figure
 from app.figures.gap_steps import gap_steps_figure
-from app.figures.gap_vectors import gap_vectors_figure, magnification, switch_names
+from app.figures.gap_vectors import gap_vectors_figure, magnification
 from app.figures.gap_where import gap_records_figure, gap_shares_figure
 from app.figures.reliability import reliability_figure
 from app.gap_report import gap_html, gap_page
-from core.gap.ledger import difference_with
+from app.gap_tables import cause_parameters
+from core.gap.ledger import difference_with, switches
+from core.gap.result import Parameter
 from core.gap.verdict_words import verdict_sentence
 from core.wording import typeset
 from tests.app.report_cases import HOSTILE
@@ -75,7 +78,7 @@ def test_the_steps_end_at_the_floor() -> None:
 
 def test_steps_of_long_names_stay_apart() -> None:
     report = gap_reports.explained(gap_reports.renamed(gap_reports.six_joints(), "x" * 300))
-    same = report.__class__(**{**report.__dict__, "causes": (report.causes[0],) * 3})
+    same = replace(report, causes=(report.causes[0],) * 3, left_rms_m=report.causes[0].gap_after_rms_m)
     assert len(set(gap_steps_figure(same).data[0].y)) == 5
 
 
@@ -109,7 +112,7 @@ def test_the_map_shows_every_cell_and_marks_causes_and_twins() -> None:
 def test_the_switches_show_the_arrows_of_every_choice_of_causes() -> None:
     report = made()
     figure = gap_vectors_figure(report)
-    assert len(switch_names(report)) == 3
+    assert len(switches(report)) == 3
     by_mask = {trace.meta["mask"]: trace for trace in figure.data if trace.meta and trace.type == "scatter3d"}
     assert sorted(by_mask) == list(range(8))
     assert [mask for mask, trace in by_mask.items() if trace.visible] == [0]
@@ -166,3 +169,15 @@ def test_texts_of_files_stay_texts() -> None:
 
 def test_an_arm_with_a_slide_has_a_page() -> None:
     assert "joint 4" in words(gap_html(gap_reports.explained(gap_reports.with_slide())))
+
+
+def test_of_many_parameters_the_clearest_are_shown() -> None:
+    parameters = tuple(Parameter(f"part {k}_m", k * 1e-3, 1e-3) for k in range(9))
+    words = cause_parameters(replace(made().causes[0], parameters=parameters))
+    assert [f"part {k}" in words for k in range(9)] == [False] * 5 + [True] * 4
+    assert words.endswith("5 more in gap.json")
+
+
+def test_what_all_causes_leave_together_is_a_bar_of_its_own_where_it_differs() -> None:
+    assert len(gap_steps_figure(made()).data[0].x) == 5
+    assert len(gap_steps_figure(replace(made(), left_rms_m=2.8e-4)).data[0].x) == 6

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.gap.ledger import closed_share, difference_with, ledger
+from core.gap.ledger import MOST_SWITCHES, closed_share, difference_with, ledger, switches
 from core.gap.place_words import MEANINGS, NAMES, cause_words, listed, place_words
 from core.gap.result import Place
 from core.gap.verdict_words import left_sentence, length_words, next_sentence, percent, verdict_sentence
@@ -120,3 +120,24 @@ def test_what_to_measure_next_says_how_well_it_would_do() -> None:
 )
 def test_shares_next_to_none_and_all_keep_a_decimal(share: float, words: str) -> None:
     assert percent(share) == words
+
+
+@pytest.mark.parametrize("count", [0, 1, MOST_SWITCHES, MOST_SWITCHES + 1, 13])
+def test_switches_cover_every_cause_once(count: int) -> None:
+    report = replace(made("explained"), causes=(made("explained").causes[0],) * count)
+    found = switches(report)
+    assert len(found) == min(count, MOST_SWITCHES)
+    assert sum(switch.causes for switch in found) == 2**count - 1
+    if count > MOST_SWITCHES:
+        assert found[-1].words == f"the {count - MOST_SWITCHES + 1} other causes"
+
+
+def test_a_sentence_names_a_few_causes_and_counts_the_others() -> None:
+    report = replace(made("explained"), causes=made("explained").causes * 2)
+    assert "coupling from joint 3 to joint 4 and 3 other causes take" in verdict_sentence(report)
+
+
+def test_what_is_left_far_above_the_floor_is_not_called_down_to_it() -> None:
+    assert "which is down to the noise" in verdict_sentence(made("explained"))
+    sentence = verdict_sentence(replace(made("explained"), left_rms_m=6e-4))
+    assert sentence.endswith("to 0.600 mm, while noise alone would leave 0.225 mm.")
