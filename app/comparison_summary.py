@@ -14,7 +14,7 @@ def comparison_summary(found: Comparison, folder: Path) -> str:
     width = max(len(row.label) for row in found.rows)
     heads = "".join(f"{name:>{w}}" for name, w in COLUMNS)
     lines = [
-        f"{found.title}: {found.trials} trials, {found.poses} kept-out poses each",
+        f"{found.title}: {found.trials} trial{'' if found.trials == 1 else 's'}, {found.poses} kept-out poses each",
         "position errors in mm (mean, p95, max), mean orientation error in mrad, errors of the phi-model's lengths",
         "in mm and angles in mrad (rms), seconds of one calibration",
         "",

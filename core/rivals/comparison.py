@@ -27,6 +27,9 @@ PUBLISHED_MM = (47.00, 1.40)
 PUBLISHED_RAD = (0.05, 0.01)
 """Mean errors before and after calibration as Sultan and Wager measured them on the real arm (figures 9 and 10)."""
 
+SINGLE_TRIAL = 0.1
+"""Share by which errors have to differ to count as different where there is one trial alone."""
+
 
 class Data(StrEnum):
     """What a method was given."""
@@ -282,6 +285,9 @@ def _row(method: Method, outcomes: list[_Outcome | None], points: int) -> Method
 
 
 def smaller(one: ErrorSizes, other: ErrorSizes) -> bool:
-    """Whether a mean is smaller than another by more than two standard errors of the difference."""
-    slack = 2 * np.sqrt(np.nan_to_num(one.mean_std) ** 2 + np.nan_to_num(other.mean_std) ** 2)
-    return one.mean < other.mean - slack
+    """Whether a mean is smaller than another by more than two standard errors of the difference.
+
+    Where a single trial tells no standard error, by more than a tenth.
+    """
+    slack = 2 * float(np.hypot(one.mean_std, other.mean_std))
+    return one.mean < other.mean - (slack if np.isfinite(slack) else SINGLE_TRIAL * other.mean)

@@ -28,7 +28,7 @@ def _on_the_same(found: Comparison, own: MethodRow) -> list[str]:
     """One of this project's methods among those that were given the same points."""
     said = [
         f"From the {own.data} this project's best is {own.name!r}: mean position error {_mm(own)} over {found.poses} "
-        f"kept-out poses and {found.trials} trials."
+        f"kept-out poses{'' if found.trials == 1 else f' in each of {found.trials} trials'}."
     ]
     bound = next((r for r in found.references if r.bounds), None)
     if bound is not None and own.data is Data.SWEEPS:

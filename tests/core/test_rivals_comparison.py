@@ -9,7 +9,18 @@ import pytest
 
 from core.errors import InputError, NotConverged
 from core.kinematics import active_commands
-from core.rivals.comparison import Comparison, Data, ErrorSizes, Found, Method, MethodRow, Reference, Trial, compare
+from core.rivals.comparison import (
+    Comparison,
+    Data,
+    ErrorSizes,
+    Found,
+    Method,
+    MethodRow,
+    Reference,
+    Trial,
+    compare,
+    smaller,
+)
 from core.rivals.comparison_json import comparison_to_json
 from core.rivals.identified import calibrated_arm_of
 from core.rivals.methods import aggregate_methods, all_methods, own_methods
@@ -202,6 +213,15 @@ def test_verdicts_say_where_it_loses_and_where_it_wins():
     free = said((0.5, True, Data.POINTS, functions), (0.4, False, Data.POINTS, functions))
     assert "From the free points this project's best is 'm1'" in free
     assert "On the very same points it loses to m2" in free
+
+
+def test_means_differ_where_luck_does_not_explain_it():
+    sizes = [ErrorSizes(mean, mean_std=std) for mean, std in ((1.0, 0.1), (0.7, 0.1), (0.75, 0.1), (0.85, np.nan))]
+    assert smaller(sizes[1], sizes[0])
+    assert not smaller(sizes[2], sizes[0])
+    assert not smaller(sizes[0], sizes[1])
+    assert smaller(sizes[3], sizes[0])
+    assert not smaller(replace(sizes[3], mean=0.95), sizes[0])
 
 
 def test_an_empty_comparison_is_refused():
