@@ -25,7 +25,21 @@ def blocks(seen: Observations) -> np.ndarray:
     posed = np.flatnonzero(~seen.swept)
     if len(posed):
         fold[posed] = regions(seen.active[posed], seen.span) % FOLDS
-    return np.where(seen.check, CHECK, fold)
+    return fold if seen.check.all() else np.where(seen.check, CHECK, fold)
+
+
+def placeable(seen: Observations, fold: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Points whose target's place is known, or shown by some point that is used in another fold, (m,)."""
+    out = np.ones(seen.count, dtype=bool)
+    if seen.simulated_m is not None:
+        return out
+    fitted = used & (fold != CHECK)
+    for target in np.unique(seen.target):
+        if seen.campaign.targets[target].point_m is None:
+            mine = seen.target == target
+            for f in np.unique(fold[mine]):
+                out[mine & (fold == f)] = (mine & fitted & (fold != f)).any()
+    return out
 
 
 def regions(active: Array, span: Array, count: int = REGIONS) -> np.ndarray:

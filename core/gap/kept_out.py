@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from core.gap.evidence import Chosen
-from core.gap.folds import CHECK
+from core.gap.folds import CHECK, placeable
 from core.gap.problem import Problem
 from core.geometry import Array
 
@@ -36,8 +36,11 @@ class KeptOut:
 
     @cached_property
     def judged(self) -> np.ndarray:
-        """Points that count: those with weight, and the owner's validation rows."""
-        return (self.problem.white.weight > 0) | (self.fold == CHECK)
+        """Points that count: those with weight and the owner's validation rows, where other folds place the target."""
+        used = self.problem.white.weight > 0
+        counted = used | (self.fold == CHECK)
+        placed = counted & placeable(self.problem.sim.seen, self.fold, used)
+        return placed if placed.any() else counted
 
     @cached_property
     def _plain_sums(self) -> tuple[Array, Array, Array]:
