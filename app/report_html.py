@@ -1,16 +1,18 @@
 """The report of a calibration: one page of HTML that holds everything it shows."""
 
-import numpy as np
+import logging
+from dataclasses import replace
 
+from app.captions import all_residuals_caption, coupling_caption, drive_caption, residual_caption
 from app.figures.couplings import coupling_figure
 from app.figures.deviations import deviations_figure
+from app.figures.over_time import over_time_figure
 from app.figures.residuals import residual_figure, thinned_sweeps
 from app.figures.transmissions import transmission_figure
 from app.report_page import Item, Page, Plot, Section, page_html
+from app.report_scene import residual_scale, scene_html
 from app.report_tables import (
-    family_words,
     is_empty,
-    reason_words,
     shown_axes,
     shown_candidates,
     shown_constants,
@@ -24,13 +26,16 @@ from app.report_tables import (
 )
 from app.report_words import CONVENTIONS, TERMS, facts, key_numbers
 from core.calibration import APART, Calibration
-from core.function_fit import FunctionFit
-from core.wording import as_sentence, decimals_for, display_unit, fixed, is_simulated, joint_list, summary, two_digits
+from core.wording import as_sentence, fixed, is_simulated, joint_list, summary
+
+LOG = logging.getLogger("trueaxis")
 
 
 def report_html(calibration: Calibration) -> str:
     """The report as one self-contained page: it opens from a disk and asks for nothing from a network."""
-    return page_html(report_page(calibration))
+    page = report_page(calibration)
+    first, *rest = page.sections
+    return page_html(replace(page, sections=(first, _scene(calibration), *rest)))
 
 
 def report_page(calibration: Calibration) -> Page:
@@ -73,6 +78,29 @@ def _findings(calibration: Calibration) -> Section:
     )
 
 
+def _scene(calibration: Calibration) -> Section:
+    """The arm to be turned and looked at; apart from the page, because it takes a server for a moment to write it."""
+    title = "The arm in 3-D"
+    try:
+        page = scene_html(calibration)
+    except OSError as error:
+        LOG.warning("the report has no 3-D scene: %s", error)
+        return Section("scene", title, (f"The scene could not be drawn on the machine of this report: {error}.",))
+    low, *_, high = residual_scale(calibration).legend()
+    text = (
+        "Drag to turn it, scroll to come nearer, hold the right button to shift it; the button in its corner lists all "
+        "parts, to be shown or hidden. Balls are the measured points, coloured by radial residual from blue "
+        f"({low.text}) over grey to orange ({high.text}); cages are rejected points."
+    )
+    if calibration.estimate.geometry is not None and calibration.nominal is not None:
+        text += (
+            " Grey: axes and common normals as designed. Green: as they are, each drawn from where its frame should "
+            "be, the differences as many times too large as the label on top says. Orange: differences beyond two "
+            "standard uncertainties, with their true values; grey arrows: smaller ones."
+        )
+    return Section("scene", title, (text,), scene=page)
+
+
 def _measured(calibration: Calibration) -> Section:
     return Section("measured", "What was measured", tables=(shown_sweeps(calibration), shown_targets(calibration)))
 
@@ -101,7 +129,7 @@ def _axes(calibration: Calibration) -> Section:
 
 def _drives(calibration: Calibration) -> Section:
     plots = tuple(
-        Plot(transmission_figure(calibration, joint), _drive_caption(calibration, joint, fit))
+        Plot(transmission_figure(calibration, joint), drive_caption(calibration, joint))
         for joint, fit in enumerate(calibration.estimate.transmissions, 1)
         if fit is not None
     )
@@ -139,7 +167,7 @@ def _couplings(calibration: Calibration) -> Section | None:
     if not seen:
         return Section("couplings", "Couplings", tuple(lines))
     after = (shown_constants(calibration, "coupling"), shown_candidates(calibration, "coupling"))
-    plots = tuple(Plot(coupling_figure(calibration, j), _coupling_caption(calibration, j)) for j in seen)
+    plots = tuple(Plot(coupling_figure(calibration, j), coupling_caption(calibration, j)) for j in seen)
     return Section(
         "couplings",
         "Couplings",
@@ -163,7 +191,8 @@ def _zeros(calibration: Calibration) -> Section:
 
 def _residuals(calibration: Calibration) -> Section:
     texts = [
-        "Measured minus predicted point, for every sweep in the order of measurement. All panels have the same scale; "
+        "Measured minus predicted point: of all sweeps over time, then sweep by sweep in the order of measurement. "
+        "All panels have the same scale; "
         "grey bands hold about 95 % of the points if the noise is as estimated."
     ]
     thin = thinned_sweeps(calibration)
@@ -172,11 +201,12 @@ def _residuals(calibration: Calibration) -> Section:
             f"Of {'; '.join(thin)} only some of the points are drawn, here and above, "
             "the largest residuals always among them."
         )
-    plots = tuple(
-        Plot(residual_figure(calibration, k), _residual_caption(calibration, k))
+    each = tuple(
+        Plot(residual_figure(calibration, k), residual_caption(calibration, k))
         for k in range(len(calibration.found.fits))
     )
-    return Section("residuals", "Residuals", tuple(texts), plots=plots)
+    drift = Plot(over_time_figure(calibration), all_residuals_caption(calibration))
+    return Section("residuals", "Residuals", tuple(texts), plots=(drift, *each))
 
 
 def _left_out(calibration: Calibration) -> Section:
@@ -196,37 +226,3 @@ def _left_out(calibration: Calibration) -> Section:
 
 def _method() -> Section:
     return Section("method", "Method and conventions", CONVENTIONS, terms=TERMS)
-
-
-def _drive_caption(calibration: Calibration, joint: int, fit: FunctionFit) -> str:
-    unit, scale = display_unit(calibration.campaign.robot.joints[joint - 1].slides)
-    text = _fit_words(fit, unit, scale)
-    excess = float(calibration.refinement.arc_excess[joint - 1]) * scale
-    if excess > 0:
-        digits = decimals_for(excess)
-        text += f" Beyond it the drive departs by {fixed(excess, digits)} {unit} (standard deviation)."
-    return text
-
-
-def _coupling_caption(calibration: Calibration, joint: int) -> str:
-    unit, scale = display_unit(calibration.campaign.robot.joints[joint - 1].slides)
-    return _fit_words(calibration.estimate.couplings[joint - 1], unit, scale)
-
-
-def _fit_words(fit: FunctionFit, unit: str, scale: float) -> str:
-    digits = decimals_for(fit.rms_after * scale)
-    before, after = fixed(fit.rms_before * scale, digits), fixed(fit.rms_after * scale, digits)
-    family = family_words(fit.form.name)
-    if len(fit.coefficients) == 0:
-        return f"Family: {family}, no constants. RMS {after} {unit}. Why: {reason_words(fit.reason)}."
-    return f"Family: {family}. RMS {before} {unit} before, {after} {unit} after. Why: {reason_words(fit.reason)}."
-
-
-def _residual_caption(calibration: Calibration, index: int) -> str:
-    at = sum(len(f.sweep.rows) for f in calibration.found.fits[:index])
-    rows = slice(at, at + len(calibration.found.fits[index].sweep.rows))
-    residuals = calibration.refinement.residuals
-    used = residuals.used[rows]
-    length = np.linalg.norm(residuals.residual_m[rows][used], axis=1)
-    rms = two_digits(1e3 * float(np.sqrt(np.mean(length**2))))
-    return f"{used.sum()} points, RMS length of their residuals in space {rms} mm."

@@ -76,7 +76,7 @@ class Plot:
     @property
     def json(self) -> str:
         """The figure for a script element: no character of it can end the element."""
-        return self.figure.to_json().replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+        return _harmless(self.figure.to_json())
 
     @property
     def size(self) -> str:
@@ -102,9 +102,16 @@ class Section:
     minor_title: str = ""
     minor_items: tuple[str, ...] = ()
     tables: tuple[ShownTable, ...] = ()
+    scene: str = ""
+    """A document of HTML that is shown in a frame of its own, as soon as a reader comes to it."""
     plots: tuple[Plot, ...] = ()
     tables_after: tuple[ShownTable, ...] = ()
     terms: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def scene_json(self) -> str:
+        """The scene for a script element."""
+        return _harmless(json.dumps(self.scene))
 
 
 @dataclass(frozen=True)
@@ -121,6 +128,10 @@ class Page:
     """Key numbers on top: label and value."""
     lead: str = ""
     """The one sentence that stands before everything else."""
+
+    @property
+    def has_scene(self) -> bool:
+        return any(section.scene for section in self.sections)
 
 
 def page_html(page: Page) -> str:
@@ -148,6 +159,11 @@ def _template() -> jinja2.Template:
 @lru_cache(maxsize=1)
 def _plotly_script() -> str:
     return get_plotlyjs()
+
+
+def _harmless(text: str) -> str:
+    """JSON for a script element: no character of it can end the element."""
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _css_string(text: str) -> str:

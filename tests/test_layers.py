@@ -54,10 +54,11 @@ USE = """
 """
 APP = """
     app.paths app.progress app.output app.standard_output app.summary
-    app.figures app.report_page app.report_cells app.report_words app.report_tables app.captions app.report_html
+    app.figures app.scene app.report_page app.report_cells app.report_words app.report_tables
+    app.captions app.report_scene app.report_html
     app.verification_report app.gap_tables app.gap_report app.gap_summary app.blind_report
     app.comparison_report app.comparison_summary
-    app.scene app.rigs app.ahead app.workbench app.pose_bench app.jobs app.spots app.clicks
+    app.rigs app.ahead app.workbench app.pose_bench app.jobs app.spots app.clicks
     app.words app.table_2 app.cell_view
     app.glossary app.keys app.uploads app.measure_words app.cell_words
     app.pose_view app.pose_words app.compensate_bench app.compensate_words app.gap_bench app.gap_words app.gap_view app.panels app.verify_tabs app.gap_tabs

@@ -84,8 +84,8 @@ def test_texts_from_files_stay_texts():
     elements = Elements(page)
     tags = [tag for tag, _ in elements.found]
     assert "img" not in tags
-    # Plotly, the drawing of the figures, and one script of data for each figure.
-    assert tags.count("script") == 2 + sum(len(s.plots) for s in report_page(hostile()).sections)
+    # Plotly, the drawing of figures and scene, the scene, and one script of data for each figure.
+    assert tags.count("script") == 4 + sum(len(s.plots) for s in report_page(hostile()).sections)
     assert "window.broken=1" in page
     assert HOSTILE in html.unescape(page)
 

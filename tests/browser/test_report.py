@@ -139,3 +139,29 @@ def test_everything_fits_on_a4(browser, tmp_path):
         printed = page.pdf(prefer_css_page_size=True)
     assert printed.startswith(b"%PDF")
     assert 5 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 14
+
+
+@pytest.mark.parametrize("case", ["six joints", "two joints swept"])
+def test_the_scene_is_in_the_page_and_needs_no_network(browser, tmp_path, case):
+    file = tmp_path / "report.html"
+    file.write_text(report_html(NAMED[case]()), encoding="utf-8")
+    page = browser.new_page(viewport={"width": 1200, "height": 800})
+    asked, errors = [], []
+    page.on("request", lambda r: asked.append(r.url) if r.url.startswith(("http", "ws", "//")) else None)
+    page.on("console", lambda m: errors.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(file.as_uri())
+    assert page.locator(".scene iframe").count() == 0
+    page.locator("#scene").scroll_into_view_if_needed()
+    frame = page.frame_locator(".scene iframe")
+    frame.locator("canvas[data-engine]").wait_for(timeout=30_000)
+    inside = page.frames[1]
+    inside.wait_for_function("() => !!window.__viserMutable?.nodeRefFromName['/points/kept']", timeout=30_000)
+    names = set(inside.evaluate("Object.keys(window.__viserMutable.nodeRefFromName)"))
+    assert {"/arm/link6/body", "/floor"} <= names
+    assert ("/diagnosis/dimensions/2_b_m" in names) == (case == "six joints")
+    # What is in the frame can reach neither the page about it nor its file.
+    assert inside.evaluate("(() => { try { return window.parent.document.title } catch { return null } })()") is None
+    page.close()
+    assert asked == []
+    assert errors == []
