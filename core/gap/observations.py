@@ -151,6 +151,8 @@ def observe(campaign: Campaign, arm: CalibratedArm | None = None) -> Observation
     simulated = table.simulated_point_m
     if simulated is not None:
         usable &= np.isfinite(simulated).all(axis=1)
+    else:
+        usable &= ~np.isin(table.target, placeless(campaign))
     rows = np.flatnonzero(usable)
     rows = rows[np.argsort(table.record[rows], kind="stable")]
     if len(rows) == 0:
@@ -169,6 +171,16 @@ def observe(campaign: Campaign, arm: CalibratedArm | None = None) -> Observation
         )
     source = f"the calibration from {arm.source!r}" if arm.source else "the calibration"
     return Observations(campaign, arm.robot, rows, active, arm.drives.net(commanded), source)
+
+
+def placeless(campaign: Campaign) -> list[int]:
+    """Targets whose place is not known and that validation rows alone show: nothing may be fitted to them."""
+    table = campaign.measurements
+    links = np.array([target.link for target in campaign.targets] or [0])
+    seen = table.seen & (table.target >= 0) & (links[table.target] > 0)
+    fitted = set(table.target[seen & ~table.check])
+    shown = set(table.target[seen]) if fitted else set()
+    return sorted(int(t) for t in shown - fitted if campaign.targets[t].point_m is None)
 
 
 def _column(values: Array | None, rows: np.ndarray, default: float) -> Array:

@@ -4,6 +4,7 @@ import numpy as np
 
 from core.gap.analysis import NoiseFound
 from core.gap.doings import Doings
+from core.gap.observations import placeless
 
 FEW = 60
 
@@ -14,6 +15,9 @@ def warnings_of(doings: Doings, noise: NoiseFound) -> tuple[str, ...]:
     out = []
     if seen.count < FEW:
         out.append(f"There are {seen.count} points only: small effects cannot be told from noise.")
+    lost = [seen.campaign.targets[t].name for t in placeless(seen.campaign)] if seen.simulated_m is None else []
+    if lost:
+        out.append(f"Only validation rows show {', '.join(lost)}, whose place is not known: they were left out.")
     if noise.source != "replicates":
         out.append(
             "Nothing was measured twice: the noise is estimated from what a flexible fit leaves, and errors that do not "
