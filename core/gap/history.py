@@ -56,31 +56,31 @@ class History:
 
     @cached_property
     def _between(self) -> tuple[Array, Array]:
-        """Loads that turn each motor at places between the records, (w - 1, steps, n), and the senses of motion."""
+        """Loads that turn each motor at places on the way to each record, (w, steps, n), and the senses of motion."""
         w, n = self.active.shape
         steps = int(np.clip(MOST_PLACES // max(w, 1), FEWEST_STEPS, MOST_STEPS))
         share = (np.arange(1, steps + 1) / steps)[None, :, None]
-        places = self.active[:-1, None] + np.diff(self.active, axis=0)[:, None] * share
+        way = np.diff(self.active, axis=0, prepend=self.active[:1])
+        places = (self.active - way)[:, None] + way[:, None] * share
         flat = places.reshape(-1, n)
         found = loads(self.seen.chain, net_of(self.seen, flat))
         if found is None:
-            return np.zeros((w - 1, steps, n)), np.sign(self.step[1:])
-        kg = np.repeat(self.payload_kg[1:], steps)
-        return drive_load(self.seen, found, kg).reshape(w - 1, steps, n), np.sign(self.step[1:])
+            return np.zeros((w, steps, n)), np.sign(self.step)
+        kg = np.repeat(self.payload_kg, steps)
+        return drive_load(self.seen, found, kg).reshape(w, steps, n), np.sign(self.step)
 
     def flank(self, joint: int, friction: float) -> Array:
         """The flank of a drive's gear that the joint rests on at each point of the gap, +1 or -1, (m,).
 
         A load above the friction of the joint (N m, N) presses it on its own flank; below, the motor drags the joint
-        behind it; at rest it stays where it is. Joints count from 0.
+        behind it; at rest it stays where it is; 0 before anything moved it. Joints count from 0.
         """
         load, sense = self._between
         load, sense = load[:, :, joint], sense[:, None, joint]
         event = np.where(np.abs(load) > friction, np.sign(load), -sense).ravel()
         state = _last_event(event[:, None])[:, 0].reshape(load.shape)[:, -1]
-        state = np.concatenate([state[:1], state])
         logged = self.logged_sense[:, joint]
-        loose = np.concatenate([[True], np.abs(load[:, -1]) <= friction])
+        loose = np.abs(load[:, -1]) <= friction
         state = np.where((logged != 0) & loose, -logged, state)
         return state[self.last]
 
