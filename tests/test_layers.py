@@ -49,7 +49,7 @@ USE = """
     core.rigid_pose core.standstills core.pose_visits core.end_effector
     core.verification core.pose_loop core.repeatability core.verification_json
     core.robot_export core.dh_export core.gap
-    core.rivals core.planning
+    core.planning core.rivals
     core.twin
 """
 APP = """

@@ -10,13 +10,14 @@ from enum import StrEnum
 import numpy as np
 
 from core.arm_jacobian import ArmState, Layout, Observations, net_displacements
-from core.driven_robot import nominal_couplings
+from core.driven_robot import nominal_driven
 from core.errors import CampaignError
 from core.geometry import Array, apply, invert, rigid_fit
 from core.kinematics import link_frames
 from core.measurements import Campaign
-from core.motion_forms import MotionFunction, coupling_form, transmission_form
-from core.robot import Joint, Robot
+from core.motion_forms import MotionFunction
+from core.planning.site_makers import drawn_drives
+from core.robot import Robot
 from core.sweep_fits import active_from_zero
 
 UNSTATED_M = 1e-3
@@ -131,20 +132,10 @@ def _nominal_links(points: ObservedPoints) -> Array:
 
 def _functions(robot: Robot, drives: Drives) -> tuple[tuple[MotionFunction, ...], tuple[MotionFunction | None, ...]]:
     """Transmissions and couplings of perfect drives."""
-    couplings = list(nominal_couplings(robot))
-    for coupling in robot.couplings if drives is Drives.FUNCTIONS else ():
-        form = coupling_form("proportional" if coupling.form == "auto" else coupling.form, coupling.gain)
-        couplings[coupling.target - 1] = MotionFunction(form, form.start())
-    return tuple(_transmission(joint, drives) for joint in robot.joints), tuple(couplings)
-
-
-def _transmission(joint: Joint, drives: Drives) -> MotionFunction:
-    """Where the robot does not say which function a drive has: a first harmonic, a ratio where it slides."""
-    name = joint.transmission if drives is Drives.FUNCTIONS else "direct"
-    if name == "auto":
-        name = "ratio" if joint.slides else "first_harmonic"
-    form = transmission_form(name, joint.drive_ratio)
-    return MotionFunction(form, form.start())
+    if drives is Drives.FUNCTIONS:
+        return drawn_drives(robot)
+    direct = nominal_driven(robot).drives
+    return direct.transmissions, direct.couplings
 
 
 def _covariance(campaign: Campaign, row: np.ndarray, repeatability_m: float) -> Array:
