@@ -92,15 +92,16 @@ def sessions_words(summaries: tuple[SessionSummary, ...], chosen: str, most: int
         return block("<p class='soft'>No session holds these words. Empty the box to see all.</p>", "session-list")
     rows = "".join(_session_row(one, one.path.name == chosen) for one in summaries[:most])
     more = f"<p class='soft'>and {len(summaries) - most} more; search for them.</p>" if len(summaries) > most else ""
-    head = "<tr><th>Session</th><th>Robot, who</th><th class='n'>Shots</th><th>Changed</th></tr>"
+    head = "<tr><th>Session</th><th class='n'>Shots</th><th>Changed (UTC)</th></tr>"
     return block(f"<table>{head}{rows}</table>{more}", "session-list")
 
 
 def _session_row(one: SessionSummary, chosen: bool) -> str:
     who = ", ".join(escape(word) for word in (one.robot, one.operator) if word)
-    problem = f"<br><span class='bad'>{escape(one.problem[:160])}</span>" if one.problem else ""
+    told = f"{escape(one.title)}<br><span class='soft'>{who}</span>"
+    told += f"<br><span class='bad'>{escape(one.problem[:160])}</span>" if one.problem else ""
     return (
-        f"<tr class='{'now' if chosen else ''}'><td>{escape(one.title)}{problem}</td><td>{who}</td>"
+        f"<tr class='{'now' if chosen else ''}'><td>{told}</td>"
         f"<td class='n'>{one.shots}/{one.planned}</td><td>{escape(one.changed_utc[:16].replace('T', ' '))}</td></tr>"
     )
 

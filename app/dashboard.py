@@ -22,6 +22,7 @@ from app.jobs import Jobs
 from app.panels.acquire import AcquirePanel
 from app.panels.check import CheckPanel
 from app.panels.export import ExportPanel
+from app.panels.help import HelpPanel
 from app.panels.results import ResultsPanel
 from app.panels.seat import Seat
 from app.panels.solve import SolvePanel
@@ -56,8 +57,10 @@ class Dashboard:
         guard_uploads(self.server, self.seat.may, self._refuse)
         self._dark = False
         self._draw_page()
-        self.jobs.when_idle(self._think_ahead)
         bench.on_change(self.refresh)
+        # A solution is not kept but computed again, so that a restart brings it back.
+        self.jobs.ask(bench.solve_again, lambda sentence: None)
+        self.jobs.when_idle(self._think_ahead)
 
     def _draw_page(self) -> None:
         """Scene and panels for the robot of the session."""
@@ -84,6 +87,8 @@ class Dashboard:
             self.export = ExportPanel(gui, bench, self.ask)
         with tabs.add_tab("View"):
             self.view = ViewPanel(gui, self.cell, self._darken, self._may)
+        with tabs.add_tab("Help"):
+            self.help = HelpPanel(gui, (keys.POSE,))
         self.results = ResultsPanel(gui, bench, self.ask)
         self.verify = VerifyTabs(self.server, bench, tabs, self.results.panel, self.cell, self.ask)
         self.gap = GapTabs(self.server, bench, tabs, self.results.panel, self.ask)
@@ -144,6 +149,7 @@ class Dashboard:
             self.check.refresh()
             self.acquire.refresh()
             self.solve.refresh()
+            self.export.refresh()
             # All at once: every batch of messages costs the browser a picture of the scene.
             self.results.refresh()
             if self.bench.calibration is not None and self.bench.calibration is not self.cell.drawn:
@@ -211,6 +217,7 @@ class Dashboard:
             (keys.PAUSE, self.acquire.pause),
             (keys.STOP, self.acquire.stop),
             (keys.SOLVE, self.solve.solve),
+            (keys.HELP, self.help.open),
         ):
             gui.add_command(key.does, hotkey=key.hotkey).on_trigger(action)
 

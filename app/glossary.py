@@ -28,6 +28,11 @@ OF_THE_PAGE = (
     ),
     ("Home", "The commands at the arm's marks, where every joint stands at zero."),
     ("Link", "The part of the arm between two joints. Link k moves with joints 1 to k; link 0 is the floor."),
+    (
+        "Net radial repeatability",
+        "Standard deviation of the distance of repeated shots from their mean, in space. An instrument with the stated "
+        "noise σ in each coordinate shows √3 σ.",
+    ),
     ("Nominal", "As designed, before any measurement."),
     ("Seat", "One browser acts at a time. The others watch live and can take the operator's seat."),
     ("Session", "One file that keeps all that is measured and decided, in its order. Nothing in it is ever deleted."),

@@ -24,5 +24,6 @@ PAUSE = Key("P", "P", "Pause the robot, or let it go on")
 STOP = Key("Esc", "escape", "Stop the robot")
 SOLVE = Key("S", "S", "Solve")
 HELP = Key("H", "H", "Help")
+POSE = Key("V", "V", "Measure the next test pose")
 KEYS = (MEASURE, ENTER, UNDO, REDO, AGAIN, SKIP, PAUSE, STOP, SOLVE, HELP)
 """Those of this module's steps; other tabs add their own."""

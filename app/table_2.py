@@ -1,5 +1,6 @@
 """Table 2 on the dashboard: design against arm, with uncertainty, and pass or fail against the operator's limits."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,27 @@ class Limits:
 
     def of(self, unit: str) -> float:
         return self.length_mm if unit == "mm" else self.angle_deg
+
+
+def limits_of(settings: Mapping[str, object]) -> Limits:
+    """The limits that stand in a session's settings."""
+    values = (settings.get(key, 0.0) for key in ("limit_length_mm", "limit_angle_deg"))
+    return Limits(*(float(value) if isinstance(value, int | float) else 0.0 for value in values))
+
+
+def limit_counts(found: "Calibration", limits: Limits) -> tuple[int, int, int] | None:
+    """How many parameters are within their limits, beyond them, and undecided; None: no limit, or no geometry."""
+    geometry = found.estimate.geometry
+    if geometry is None or found.nominal is None or limits == Limits():
+        return None
+    counts = {"✔": 0, "✖": 0, "?": 0}
+    for (i, k), std in np.ndenumerate(geometry.std):
+        scale, unit = SCALES[k]
+        difference = (geometry.model.parameters[i, k] - found.nominal.parameters[i, k]) * scale
+        said = verdict(difference, std * scale, limits.of(unit)) if std > 0 else ""
+        for sign in counts:
+            counts[sign] += f">{sign}<" in said
+    return counts["✔"], counts["✖"], counts["?"]
 
 
 def table_2(found: "Calibration", limits: Limits) -> str:

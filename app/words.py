@@ -5,6 +5,7 @@ from html import escape
 from app.clicks import listening, saying
 from app.spots import spot_of
 from core.findings import Finding
+from core.wording import as_sentence
 
 STYLE = """<style>
 .ta{font-size:13px;line-height:1.45;padding:0 10px;overflow-wrap:anywhere}
@@ -31,12 +32,20 @@ def block(inner: str, test_id: str) -> str:
 
 def findings_words(findings: tuple[Finding, ...]) -> str:
     """Findings as a list, significant ones marked by sign and colour; a click shows where it is."""
-    items = "".join(_finding(finding) for finding in findings)
-    return block(listening(f"<ul style='padding-left:18px;margin:4px 0'>{items}</ul>"), "findings")
+    told = _list([finding for finding in findings if finding.significant])
+    quiet = [finding for finding in findings if not finding.significant]
+    if quiet:
+        count = "1 value is" if len(quiet) == 1 else f"{len(quiet)} values are"
+        told += f"<details><summary class='soft'>{count} not significantly off</summary>{_list(quiet)}</details>"
+    return block(listening(told), "findings")
+
+
+def _list(findings: list[Finding]) -> str:
+    return f"<ul style='padding-left:18px;margin:4px 0'>{''.join(map(_finding, findings))}</ul>"
 
 
 def _finding(finding: Finding) -> str:
     spot = spot_of(finding)
     where = "" if spot is None else saying(spot.word, "Show it in 3-D")
     look, sign = ("bad", "▲") if finding.significant else ("soft", "○")
-    return f"<li class='{look}' {where}>{sign} {escape(finding.text)}</li>"
+    return f"<li class='{look}' {where}>{sign} {escape(as_sentence(finding.text))}</li>"

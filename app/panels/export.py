@@ -1,19 +1,17 @@
 """Export: one click each, file names that sort."""
 
 from collections.abc import Callable
-from datetime import UTC, datetime
-from typing import TYPE_CHECKING
 
 import viser
 
+from app.exports import RESULTS, ROBOTS, Export, stamped
 from app.words import block
 from app.workbench import Workbench
 from core.errors import InputError
+from core.session_archive import campaign_archive
+from core.session_store import SUFFIX
 
-if TYPE_CHECKING:
-    from core.calibration import Calibration
-
-MIME_SAFE = {"Report (HTML)": "html", "Calibration (JSON)": "json", "Tables (XLSX)": "xlsx", "Points (CSV)": "csv"}
+NOT_SOLVED = "Nothing is solved yet: go to 3 Solve and press Solve, then export."
 
 
 class ExportPanel:
@@ -21,61 +19,51 @@ class ExportPanel:
 
     def __init__(self, gui: viser.GuiApi, bench: Workbench, ask: Callable) -> None:
         self._bench, self._ask = bench, ask
-        gui.add_html(
-            block("<h3>Export</h3><p>Solve first. Each file is sent to this browser's downloads.</p>", "export-intro")
-        )
-        for label in MIME_SAFE:
-            button = gui.add_button(label, icon=viser.Icon.DOWNLOAD)
-            button.on_click(lambda event, label=label: self._send(event, label))
+        self._intro = gui.add_html("")
+        for export in RESULTS:
+            self._button(gui, export)
+        with gui.add_folder("The calibrated robot for other tools", expand_by_default=False):
+            for export in ROBOTS:
+                self._button(gui, export)
+        hint = "campaign.toml, robot.toml, measurements.csv: for the command line, and to open again here."
+        gui.add_button("Campaign (ZIP)", icon=viser.Icon.DOWNLOAD, hint=hint).on_click(self._send_campaign)
 
-    def _send(self, event: viser.GuiEvent, label: str) -> None:
+    def refresh(self) -> None:
+        """Say whether there is something to export."""
+        self._intro.content = intro_words(self._bench.calibration is not None, self._bench.since_solved)
+
+    def _button(self, gui: viser.GuiApi, export: Export) -> None:
+        button = gui.add_button(export.label, icon=viser.Icon.DOWNLOAD, hint=export.hint)
+        button.on_click(lambda event: self._send(event, export))
+
+    def _send(self, event: viser.GuiEvent, export: Export) -> None:
         def job(client: viser.ClientHandle | None) -> None:
             found = self._bench.calibration
             if found is None:
-                raise InputError("Nothing is solved yet: go to 3 Solve and press Solve, then export.")
+                raise InputError(NOT_SOLVED)
+            data = export.made(found)
             if client is not None:
-                ending = MIME_SAFE[label]
-                name = f"{datetime.now(UTC):%Y-%m-%d_%H%M%S}_trueaxis_calibration.{ending}"
-                client.send_file_download(name, exported(found, ending), save_immediately=True)
+                client.send_file_download(stamped(export.what, export.ending), data, save_immediately=True)
+
+        self._ask(event, job, operator=False)
+
+    def _send_campaign(self, event: viser.GuiEvent) -> None:
+        def job(client: viser.ClientHandle | None) -> None:
+            data = campaign_archive(self._bench.state, self._bench.session.path.name.removesuffix(SUFFIX))
+            if client is not None:
+                client.send_file_download(stamped("trueaxis_campaign", "zip"), data, save_immediately=True)
 
         self._ask(event, job, operator=False)
 
 
-def exported(found: "Calibration", ending: str) -> bytes:
-    """The bytes of an export: html, json, xlsx or csv."""
-    from core.report import tables
-
-    if ending == "html":
-        from app.report_html import report_html
-
-        return report_html(found).encode()
-    if ending == "json":
-        from core.calibration_json import calibration_to_json
-
-        return calibration_to_json(found).encode()
-    if ending == "csv":
-        from core.measurement_writer import measurements_csv
-
-        return measurements_csv(found.campaign).encode()
-    return _workbook(tables(found))
-
-
-def _workbook(all_tables: tuple) -> bytes:
-    from io import BytesIO
-
-    import xlsxwriter
-
-    buffer = BytesIO()
-    book = xlsxwriter.Workbook(
-        buffer, {"in_memory": True, "strings_to_formulas": False, "strings_to_urls": False, "nan_inf_to_errors": True}
-    )
-    bold = book.add_format({"bold": True})
-    for table in all_tables:
-        sheet = book.add_worksheet(table.name[:31])
-        sheet.write_row(0, 0, [str(c) for c in table.frame.columns], bold)
-        for row, values in enumerate(table.frame.astype(object).where(table.frame.notna(), None).values.tolist(), 1):
-            sheet.write_row(row, 0, values)
-        sheet.autofit()
-        sheet.freeze_panes(1, 0)
-    book.close()
-    return buffer.getvalue()
+def intro_words(solved: bool, since: int) -> str:
+    """What this step is for, and whether it can be done."""
+    if not solved:
+        now = "<p class='doubt'>Nothing is solved yet: press <b>Solve</b> under <b>3 Solve</b> first.</p>"
+    elif since:
+        count = "One shot or decision" if since == 1 else f"{since} shots or decisions"
+        now = f"<p class='doubt'>{count} came after the solution; solve again to have them in the report.</p>"
+    else:
+        now = "<p class='ok'>✔ The solution is up to date.</p>"
+    text = "<p class='soft'>Each file goes to this browser's downloads; its name begins with date and time (UTC).</p>"
+    return block(f"<h3>Export</h3>{now}{text}", "export-intro")

@@ -1,13 +1,13 @@
 """The sessions of the folder: find, open, copy, send away as one file or as a campaign."""
 
 from collections.abc import Callable
-from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import viser
 
 from app.cell_words import sessions_words
+from app.exports import stamped
 from app.words import block
 from app.workbench import Workbench
 from core.errors import InputError
@@ -103,8 +103,3 @@ class SessionShelf:
                 client.send_file_download(stamped(f"{name}_campaign", "zip"), data, save_immediately=True)
 
         self._ask(event, job, operator=False)
-
-
-def stamped(name: str, ending: str) -> str:
-    """A file name that sorts by the time when it was made."""
-    return f"{datetime.now(UTC):%Y-%m-%d_%H%M%S}_{name}.{ending}"

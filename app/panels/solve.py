@@ -1,16 +1,23 @@
-"""Solving on demand, and what the solution says in sentences."""
+"""Solving on demand, families of functions to choose, and what the solution says in sentences."""
 
 from collections.abc import Callable
-from html import escape
 from typing import TYPE_CHECKING
 
 import viser
 
-from app.words import block, findings_words
+from app.solve_words import summary_words, unsolved_words
+from app.table_2 import limits_of
+from app.words import block
 from app.workbench import Workbench
+from core.errors import InputError
+from core.session_events import Setting
+from core.session_families import COUPLING_FAMILIES, coupling_key, drive_families, drive_key, with_families
+from core.solve_figures import changes
 
 if TYPE_CHECKING:
-    from core.calibration import Calibration
+    pass
+
+AS_DESIGNED = "as in robot.toml"
 
 
 class SolvePanel:
@@ -18,44 +25,82 @@ class SolvePanel:
 
     def __init__(self, gui: viser.GuiApi, bench: Workbench, ask: Callable) -> None:
         self._bench, self._ask = bench, ask
-        self._drawn: Calibration | None = None
+        self._shown: tuple | None = None
         gui.add_html(
             block(
                 "<h3>Solve</h3><p>Axes, drives, couplings and the arm's parameters from all shots that count. "
-                "Do it as often as you like while measuring; the joints that are missing are named.</p>",
+                "Do it as often as you like while measuring; the joints that are missing are named.</p>"
+                "<p class='soft'>Next: look at residuals and geometry on the right, then <b>4 Export</b>.</p>",
                 "solve-intro",
             )
         )
         gui.add_button("Solve", icon=viser.Icon.CALCULATOR, hint="S").on_click(self.solve)
+        self._busy = gui.add_html("")
         self._words = gui.add_html("")
+        with gui.add_folder("Families of drives and couplings", expand_by_default=False):
+            self._families = self._build_families(gui)
 
     def solve(self, event: object) -> None:
         """Calibrate from what is there."""
-        self._ask(event, lambda client: self._bench.solve())
+
+        def job(client: object) -> None:
+            self._busy.content = block("<p class='soft'>Solving …</p>", "solving")
+            try:
+                self._bench.solve()
+            finally:
+                self._busy.content = ""
+
+        self._ask(event, job)
 
     def refresh(self) -> None:
         """Show the last solution, if there is one."""
-        found = self._bench.calibration
+        bench, state = self._bench, self._bench.state
+        for key, box in self._families.items():
+            box.value = str(state.settings.get(key, AS_DESIGNED))
+        found, since, limits = bench.calibration, bench.since_solved, limits_of(state.settings)
+        last = state.solves[-1] if state.solves else None
+        shown = found, since, limits, None if last is None else last.id, bool(state.shots)
+        if shown == self._shown:
+            return
+        self._shown = shown
         if found is None:
-            text = "Nothing is solved yet. One finished sweep is enough to begin."
-            self._words.content = block(f"<p class='soft'>{text}</p>", "solution")
-        elif found is not self._drawn:
-            self._drawn = found
-            self._words.content = _summary(found, self._bench.previous)
+            self._words.content = unsolved_words(last, since, len(state.shots))
+        else:
+            self._words.content = summary_words(found, limits, self._changes(), since)
 
+    def _changes(self) -> tuple:
+        solves = self._bench.state.solves
+        return changes(solves[-2].solved.figures, solves[-1].solved.figures) if len(solves) > 1 else ()
 
-def _summary(found: "Calibration", before: "Calibration | None") -> str:
-    used = int(found.refinement.residuals.used.sum())
-    text = (
-        f"<p data-testid='solution'><b>{used}</b> points used, <b>{len(found.rejected)}</b> rejected; "
-        f"one coordinate scatters by <b data-testid='noise'>{found.estimate.noise_m * 1e3:.3f} mm</b>.</p>"
-    )
-    if before is not None:
-        change = (found.estimate.noise_m - before.estimate.noise_m) * 1e3
-        text += f"<p class='soft'>Since the last solution: noise {change:+.3f} mm.</p>"
-    if found.not_swept:
-        missing = ", ".join(map(str, found.not_swept))
-        text += f"<p class='doubt'>Not swept yet: joint {missing}. The geometry needs them all.</p>"
-    for rejection in found.rejected:
-        text += f"<p class='doubt'>Record {rejection.record} left out: {escape(rejection.reason)}.</p>"
-    return block(text, "solution-box") + findings_words(found.findings)
+    def _build_families(self, gui: viser.GuiApi) -> dict[str, viser.GuiDropdownHandle]:
+        text = "Which function a drive is given. With auto the most probable one is chosen by evidence; see Drives."
+        gui.add_html(block(f"<p class='soft'>{text}</p>", "families-intro"))
+        robot = self._bench.nominal
+        boxes = {
+            drive_key(number): gui.add_dropdown(f"Drive of joint {number}", (AS_DESIGNED, *drive_families(joint)))
+            for number, joint in enumerate(robot.joints, 1)
+            if robot.commanded[number - 1]
+        }
+        for coupling in robot.couplings:
+            label = f"Coupling {coupling.source} → {coupling.target}"
+            boxes[coupling_key(coupling.target)] = gui.add_dropdown(label, (AS_DESIGNED, *COUPLING_FAMILIES))
+        for key, box in boxes.items():
+            box.on_update(lambda event, key=key: self._choose(event, key))
+        return boxes
+
+    def _choose(self, event: viser.GuiEvent, key: str) -> None:
+        if event.client is None:
+            return
+        chosen = self._families[key].value
+        value = None if chosen == AS_DESIGNED else chosen
+
+        def job(client: object) -> None:
+            if value == self._bench.state.settings.get(key):
+                return
+            if not isinstance(value, str | None):
+                raise InputError(f"{key}: {value!r}, expected the name of a family")
+            with_families(self._bench.nominal, {} if value is None else {key: value})
+            self._bench.session.append(Setting(key, value))
+            self._bench.changed()
+
+        self._ask(event, job)
