@@ -1,6 +1,7 @@
 """Residuals and columns divided by what the noise makes of them: unit variance, no correlation."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,9 +28,15 @@ class Whitening:
         previous = np.concatenate(
             [np.zeros_like(out[:1]) if before is None else self._one(before, slice(first - 1, first)), out[:-1]]
         )
-        linked = (np.arange(first, first + len(values)) > 0).reshape(-1, *([1] * (out.ndim - 1)))
+        linked = self._linked[r].reshape(-1, *([1] * (out.ndim - 1)))
         mixed = (out - self.correlation * previous) / np.sqrt(1 - self.correlation**2)
         return np.where(linked, mixed, out)
+
+    @cached_property
+    def _linked(self) -> np.ndarray:
+        """Points whose noise follows on that of a point before that is taken, (m,)."""
+        taken = self.weight > 0
+        return taken & np.concatenate([[False], taken[:-1]])
 
     def _one(self, values: Array, rows: slice) -> Array:
         flat = values.reshape(len(values), 3, -1)
