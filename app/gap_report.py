@@ -61,6 +61,7 @@ TERMS = (
     ("Log odds", "How strongly the data speak for the effect against none, natural logarithm; 5 is strong."),
 )
 KEPT_OUT = "Kept out"
+MOST_IN_SUMMARY = 5
 
 
 def gap_html(report: GapReport) -> str:
@@ -98,7 +99,9 @@ def gap_page(report: GapReport) -> Page:
 
 
 def _summary(report: GapReport) -> tuple[str, ...]:
-    lines = [cause_sentence(cause) for cause in report.causes]
+    lines = [cause_sentence(cause) for cause in report.causes[:MOST_IN_SUMMARY]]
+    if len(report.causes) > MOST_IN_SUMMARY:
+        lines.append(f"{len(report.causes) - MOST_IN_SUMMARY} more causes are in the table.")
     if report.verdict is not Verdict.NO_GAP:
         lines += [left_sentence(report), f"Worst region: {_sentence(report.where.worst_region)}"]
     if report.rivals:

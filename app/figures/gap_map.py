@@ -11,8 +11,9 @@ from core.gap.place_words import NAMES, effect_name, place_words
 from core.gap.result import Cell, GapReport, Place
 
 ROW_PX = 22
+FULL = (0.05, 0.1, 0.25, 0.5, 1.0)
 STRONG = 0.5
-"""From this share on a cell is so dark that white is read on it."""
+"""From this part of the full colour on a cell is so dark that white is read on it."""
 SCALE = [[0.0, "rgba(0, 114, 178, 0.07)"], [1.0, "rgba(0, 114, 178, 1)"]]
 """Sees the page through, so that it serves on dark and light ones."""
 NOWHERE = "–"
@@ -38,7 +39,8 @@ def gap_map_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure | No
     grid = _grid(report)
     if not grid.effects:
         return None
-    traces = [_shares(grid), *_links(report, grid), *_marks(report, grid)]
+    full = _full(grid)
+    traces = [_shares(grid, full), *_links(report, grid), *_marks(report, grid, full)]
     names = [effect_name(effect) for effect in grid.effects]
     y = {"type": "category", "categoryorder": "array", "categoryarray": names, "autorange": "reversed"}
     x = {"type": "category", "categoryorder": "array", "categoryarray": list(grid.columns), "showgrid": False}
@@ -70,7 +72,13 @@ def _grid(report: GapReport) -> Grid:
     return Grid(tuple(effects), tuple([*columns, *others]), cells)
 
 
-def _shares(grid: Grid) -> Trace:
+def _full(grid: Grid) -> float:
+    """The share that is drawn in full colour: where all effects close little, the best of them are still to be seen."""
+    best = max((np.nan_to_num(cell.share_closed) for cell in grid.cells.values()), default=0.0)
+    return next((share for share in FULL if best <= share), 1.0)
+
+
+def _shares(grid: Grid, full: float) -> Trace:
     share = np.full((len(grid.effects), len(grid.columns)), np.nan)
     words = np.full(share.shape, "", dtype=object)
     for i, effect in enumerate(grid.effects):
@@ -86,7 +94,7 @@ def _shares(grid: Grid) -> Trace:
         "z": share,
         "customdata": words,
         "zmin": 0.0,
-        "zmax": 1.0,
+        "zmax": full,
         "colorscale": SCALE,
         "xgap": 2,
         "ygap": 2,
@@ -117,7 +125,7 @@ def _links(report: GapReport, grid: Grid) -> list[Trace]:
     return out
 
 
-def _marks(report: GapReport, grid: Grid) -> list[Trace]:
+def _marks(report: GapReport, grid: Grid, full: float) -> list[Trace]:
     """The number of each cause; with a question mark where a twin of it stands."""
     marks: dict[tuple[str, str], str] = {}
     dark: dict[tuple[str, str], bool] = {}
@@ -126,7 +134,7 @@ def _marks(report: GapReport, grid: Grid) -> list[Trace]:
             spot = grid.spot(place)
             if spot is not None:
                 cell = grid.cells.get((place.effect, spot[0]))
-                dark[spot] = cell is not None and cell.share_closed >= STRONG
+                dark[spot] = cell is not None and cell.share_closed >= STRONG * full
                 text = f"{number}" if place == cause.place else f"{number}?"
                 marks[spot] = f"{marks[spot]} {text}" if spot in marks else text
     groups = ((True, {"color": "white"}), (False, {}))

@@ -16,6 +16,8 @@ VALUE_PX = 68
 """Of the value behind a bar."""
 LABEL_PX = 7
 """Of one letter of a label, about."""
+MOST_CAUSES = 8
+"""With a bar of their own."""
 SAME = 0.02
 """Lengths that differ by less are drawn as one."""
 TOGETHER = "All of them fitted together"
@@ -28,8 +30,12 @@ FLOOR_NAMES = {
 
 def gap_steps_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure:
     """Rms length of real minus sim on kept-out points, one bar a step, from top to bottom."""
-    names = [f"Sim as it is: {report.sim}", *(f"+ {cause_words(cause)}" for cause in report.causes)]
-    steps = [report.gap_rms_m, *(cause.gap_after_rms_m for cause in report.causes)]
+    causes = report.causes if len(report.causes) <= MOST_CAUSES else report.causes[: MOST_CAUSES - 1]
+    names = [f"Sim as it is: {report.sim}", *(f"+ {cause_words(cause)}" for cause in causes)]
+    steps = [report.gap_rms_m, *(cause.gap_after_rms_m for cause in causes)]
+    if len(causes) < len(report.causes):
+        names.append(f"+ {len(report.causes) - len(causes)} other causes")
+        steps.append(report.causes[-1].gap_after_rms_m)
     if abs(report.left_rms_m - steps[-1]) > SAME * report.left_rms_m:
         names.append(TOGETHER)
         steps.append(report.left_rms_m)

@@ -1,6 +1,6 @@
 """answers.json: what was really wrong with each campaign of a blind check."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from core.errors import InputError
@@ -31,6 +31,8 @@ class Answer:
     effect: str
     given: tuple[tuple[str, int | str | None], ...] = ()
     """Parts of the place that the answer names, with their values; None: all joints or links."""
+    asked: bool = True
+    """False: it is there as well, but too weak to be asked for; naming it is right, missing it is not wrong."""
 
     @property
     def joint(self) -> int | None:
@@ -51,11 +53,19 @@ Answers = dict[str, tuple[Answer, ...]]
 def read_answers(path: Path) -> Answers:
     """The answers by name of subfolder; none: nothing is wrong with that campaign.
 
+    Beside ``effects`` a campaign may have ``also``: effects that are there as well and are not asked for.
+
     Raises:
         InputError: the file is missing, or something in it is not as expected; one sentence says what.
     """
     top = read_object(path)
-    return {name: tuple(map(_answer, top.record(name).records("effects"))) for name in top.names()}
+    return {name: _answers(top.record(name)) for name in top.names()}
+
+
+def _answers(record: JsonRecord) -> tuple[Answer, ...]:
+    also = record.records("also") if "also" in record else ()
+    asked = tuple(map(_answer, record.records("effects")))
+    return (*asked, *(replace(_answer(one), asked=False) for one in also))
 
 
 def _answer(record: JsonRecord) -> Answer:

@@ -83,6 +83,8 @@ def score_record(score: Score) -> Json:
             "top_1": "the strongest cause is one that is there; campaigns that could not be diagnosed count as missed",
             "joint": "the joint of the strongest cause is right whatever the effect; where the answer names a joint",
             "precision": "of the names said; an unknown cause is an abstention and is not counted",
+            "also": "effects that the answers give as present without asking for them: naming one is right, missing "
+            "it is not wrong",
             "wrong_names_after_abstention": "campaigns in which a cause that is not there was named alone (no class) "
             "with a probability above 0.5",
             "brier": "over all causes said, against effect and place both being right; an unknown one is right where "
@@ -131,6 +133,7 @@ def _calibration_record(found: Calibration) -> Json:
 def _case_record(case: Case) -> Json:
     return {
         "there": [answer_record(answer) for answer in case.answers],
+        "also": [answer_record(answer) for answer in case.also],
         "met": [k is not None for k in case.exact],
         "met_up_to_class": [k is not None for k in case.up_to_class],
         "wrong_names": [place_record(cause.place) for cause in case.wrong_names],

@@ -50,6 +50,8 @@ class Case:
 
     said: Said
     answers: tuple[Answer, ...]
+    also: tuple[Answer, ...]
+    """What is there as well without being asked for."""
     exact: tuple[int | None, ...]
     """For every answer the cause that met it by name, by index; each meets one at most."""
     up_to_class: tuple[int | None, ...]
@@ -71,14 +73,22 @@ class Case:
 
     @property
     def alarmed(self) -> bool:
-        """Whether a gap was claimed."""
-        return self.said.verdict is not Verdict.NO_GAP or bool(self.said.causes)
+        """Whether a gap was claimed, beyond what is there as well."""
+        causes = self.said.causes
+        if self.also and causes:
+            return not all(_meets_any(cause, self.also) for cause in causes)
+        return self.said.verdict is not Verdict.NO_GAP or bool(causes)
+
+    @property
+    def there(self) -> tuple[Answer, ...]:
+        """All that is there, asked for or not."""
+        return (*self.answers, *self.also)
 
     @property
     def wrong_names(self) -> tuple[SaidCause, ...]:
         """Single names, said with confidence, of effects that are not there."""
         sure = [c for c in self.said.causes if len(c.places) == 1 and c.probability > CONFIDENT]
-        return tuple(c for c in sure if c.place.effect != UNKNOWN and not _meets_any(c, self.answers))
+        return tuple(c for c in sure if c.place.effect != UNKNOWN and not _meets_any(c, self.there))
 
     @property
     def share_closed(self) -> float:
@@ -180,11 +190,13 @@ def score(said: tuple[Said, ...], answers: Answers) -> Score:
     )
 
 
-def _case(said: Said, answers: tuple[Answer, ...]) -> Case:
+def _case(said: Said, there: tuple[Answer, ...]) -> Case:
+    answers, also = (tuple(a for a in there if a.asked is asked) for asked in (True, False))
     exact = np.array([[a.is_met_by(c.place) for c in said.causes] for a in answers], dtype=bool)
     loose = np.array([[any(a.is_met_by(p) for p in c.places) for c in said.causes] for a in answers], dtype=bool)
     shape = (len(answers), len(said.causes))
-    return Case(said, answers, _matched(exact.reshape(shape)), _matched(loose.reshape(shape), exact.reshape(shape)))
+    exact, loose = exact.reshape(shape), loose.reshape(shape)
+    return Case(said, answers, also, _matched(exact), _matched(loose, exact))
 
 
 def _matched(allowed: np.ndarray, preferred: np.ndarray | None = None) -> tuple[int | None, ...]:
@@ -203,9 +215,18 @@ def _meets_any(cause: SaidCause, answers: tuple[Answer, ...]) -> bool:
     return any(answer.is_met_by(cause.place) for answer in answers)
 
 
-def _is_right(cause: SaidCause, case: Case, up_to_class: bool) -> bool:
+def _meets(cause: SaidCause, answers: tuple[Answer, ...], up_to_class: bool) -> bool:
     places = cause.places if up_to_class else (cause.place,)
-    return any(answer.is_met_by(place) for answer in case.answers for place in places)
+    return any(answer.is_met_by(place) for answer in answers for place in places)
+
+
+def _is_right(cause: SaidCause, case: Case, up_to_class: bool) -> bool:
+    return _meets(cause, case.there, up_to_class)
+
+
+def _first(case: Case) -> SaidCause | None:
+    """The strongest cause that was said."""
+    return case.said.causes[0] if case.said.causes else None
 
 
 def _share(outcomes: list[bool]) -> Share:
@@ -213,11 +234,11 @@ def _share(outcomes: list[bool]) -> Share:
 
 
 def _top_one(cases: list[Case]) -> TopOne:
-    first = [(case, case.said.causes[0] if case.said.causes else None) for case in cases]
+    first = [(case, _first(case)) for case in cases]
     joints = [(c, {a.joint for a in case.answers if a.joint}) for case, c in first]
     return TopOne(
-        exact=_share([c is not None and _is_right(c, case, False) for case, c in first]),
-        up_to_class=_share([c is not None and _is_right(c, case, True) for case, c in first]),
+        exact=_share([c is not None and _meets(c, case.answers, False) for case, c in first]),
+        up_to_class=_share([c is not None and _meets(c, case.answers, True) for case, c in first]),
         joint=_share([c is not None and c.place.joint in wanted for c, wanted in joints if wanted]),
     )
 
@@ -227,10 +248,10 @@ def _sets(cases: list[Case]) -> SetMeasures:
     precision, precision_class, recall, recall_class, complete = [], [], [], [], []
     for case in cases:
         met, met_class = (sum(k is not None for k in m) for m in (case.exact, case.up_to_class))
-        claims = sum(c.place.effect != UNKNOWN for c in case.said.causes)
+        claims = sum(c.place.effect != UNKNOWN and not _meets_any(c, case.also) for c in case.said.causes)
         claims += sum(k is not None and a.effect == OTHER for a, k in zip(case.answers, case.exact, strict=True))
         if claims:
-            precision.append(met / claims)
+            precision.append(min(met / claims, 1.0))
             precision_class.append(min(met_class / claims, 1.0))
         recall.append(met / len(case.answers))
         recall_class.append(met_class / len(case.answers))

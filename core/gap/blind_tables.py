@@ -30,8 +30,9 @@ def answer_words(answer: Answer) -> str:
 
 
 def there_words(case: Case) -> str:
-    """Everything that is there."""
-    return "; ".join(map(answer_words, case.answers)) or "nothing"
+    """Everything that is there; what is not asked for stands in brackets."""
+    asked = "; ".join(map(answer_words, case.answers)) or "nothing"
+    return f"{asked} (and {'; '.join(map(answer_words, case.also))})" if case.also else asked
 
 
 def said_words(said: Said) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,7 +16,7 @@ from app.commands import blind_check
 from core.gap import blind_answers
 from core.gap.blind_check import Said, SaidCause
 from core.gap.result import GapReport, Place, Verdict
-from tests.app.command_line import SAMPLES, contents
+from tests.app.command_line import SAMPLES, contents, trueaxis
 from tests.core import gap_reports
 
 CAMPAIGN = SAMPLES / "irb_l6"
@@ -183,3 +184,20 @@ def test_a_page_of_a_blind_check_escapes_names(suite: Path, tmp_path: Path, monk
     (suite / "answers.json").write_text(json.dumps({"a": ANSWERS["a"], name: {"effects": []}}), encoding="utf-8")
     assert main(["blind-check", str(suite), "--out", str(tmp_path / "out")]) == 0
     assert "<img" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8").split("<main>")[1]
+
+
+@pytest.mark.slow
+def test_both_commands_as_processes_with_the_real_diagnosis(tmp_path: Path) -> None:
+    folder, out = tmp_path / "suite", tmp_path / "out"
+    shutil.copytree(SAMPLES / "scara_slide", folder / "real")
+    (folder / "broken").mkdir()
+    (folder / "answers.json").write_text('{"real": {"effects": []}, "broken": {"effects": []}}', encoding="utf-8")
+    done = trueaxis("gap", folder / "real", "--out", tmp_path / "gap", timeout=300)
+    assert (done.returncode, done.stderr) == (0, "")
+    document = json.loads((tmp_path / "gap" / "gap.json").read_text(encoding="utf-8"))
+    done = trueaxis("blind-check", folder, "--out", out, timeout=300)
+    assert (done.returncode, done.stderr) == (0, "")
+    said = json.loads((out / "blind.json").read_text(encoding="utf-8"))["said"]
+    assert "campaign.toml is missing" in said["broken"]["failure"]
+    assert said["real"]["verdict"] == document["verdict"]
+    assert [cause["effect"] for cause in said["real"]["causes"]] == [cause["effect"] for cause in document["causes"]]

@@ -181,3 +181,18 @@ def test_of_many_parameters_the_clearest_are_shown() -> None:
 def test_what_all_causes_leave_together_is_a_bar_of_its_own_where_it_differs() -> None:
     assert len(gap_steps_figure(made()).data[0].x) == 5
     assert len(gap_steps_figure(replace(made(), left_rms_m=2.8e-4)).data[0].x) == 6
+
+
+def test_many_causes_share_the_last_bar_and_the_end_of_the_summary() -> None:
+    many = replace(made(), causes=made().causes * 5)
+    assert len(gap_steps_figure(many).data[0].x) == 1 + 8 + 1
+    assert any("10 more causes are in the table" in line for line in gap_page(many).summary)
+
+
+def test_small_shares_are_seen_on_the_map() -> None:
+    report = made()
+    small = replace(
+        report, evidence_map=tuple(replace(c, share_closed=c.share_closed / 10) for c in report.evidence_map)
+    )
+    assert gap_map_figure(report).data[0].zmax == 1.0
+    assert gap_map_figure(small).data[0].zmax == 0.1

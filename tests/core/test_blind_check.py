@@ -58,7 +58,6 @@ def test_a_process_that_dies_takes_no_other_campaign_with_it(tmp_path: Path) -> 
 
 
 def test_a_campaign_that_cannot_be_read_becomes_a_sentence(tmp_path: Path) -> None:
-    pytest.importorskip("core.gap.diagnosis")
     (folder,) = folders(tmp_path, "empty")
     said = said_of(folder)
     assert said.verdict is None

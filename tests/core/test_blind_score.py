@@ -195,6 +195,26 @@ def test_the_confusion_table_has_every_answer_once() -> None:
     assert len(campaigns_csv(scored(*pairs)).splitlines()) == 1 + len(pairs)
 
 
+def test_what_is_there_without_being_asked_for_may_be_named_or_missed() -> None:
+    asked, also = one("backlash", joint=3), (Answer("ratio", (("joint", 2),), asked=False),)
+    found = scored(
+        (said("named", cause(BACKLASH_3), cause(RATIO_2)), (*asked, *also)),
+        (said("missed", cause(BACKLASH_3)), (*asked, *also)),
+        (said("first", cause(RATIO_2), cause(BACKLASH_3)), (*asked, *also)),
+        (said("seen in nothing", cause(RATIO_2)), also),
+        (said("alarm", cause(BACKLASH_3)), also),
+        (said("quiet", verdict=Verdict.NO_GAP), also),
+    )
+    assert found.single.exact.of == 3
+    assert found.single.exact.count == 2
+    assert (found.false_alarms.count, found.false_alarms.of) == (1, 3)
+    assert [case.said.name for case in found.cases if case.wrong_names] == ["alarm"]
+    assert found.by_name.brier == pytest.approx((6 * 0.01 + 0.81) / 7)
+    mixed = (*asked, *one("scale"), *also)
+    sets = scored((said("a", cause(BACKLASH_3), cause(RATIO_2), cause(Place("scale"))), mixed)).sets
+    assert (sets.precision, sets.recall) == (1.0, 1.0)
+
+
 def test_no_cases_at_all() -> None:
     empty = score((), {})
     assert empty.confusion.counts.shape == (0, 0)
@@ -231,8 +251,9 @@ def test_answers_are_read_with_every_way_to_name_a_place(tmp_path: Path) -> None
         {"effect": "base_shift", "record": 50},
         {"effect": "other"},
     ]
-    found = read_answers(written(tmp_path, json.dumps({"a": {"effects": effects}, "b": {"effects": []}})))
-    assert found["b"] == ()
+    also = [{"effect": "drift"}]
+    found = read_answers(written(tmp_path, json.dumps({"a": {"effects": effects}, "b": {"effects": [], "also": also}})))
+    assert found["b"] == (Answer("drift", asked=False),)
     assert [dict(answer.given) for answer in found["a"]] == [
         {"joint": 3},
         {"source": 3, "joint": 4},
@@ -256,6 +277,7 @@ def test_answers_are_read_with_every_way_to_name_a_place(tmp_path: Path) -> None
         ('{"a": 3}', "a = 3, expected an object"),
         ('{"a": {}}', "a.effects is missing, expected a list of objects"),
         ('{"a": {"effects": [7]}}', "expected a list of objects"),
+        ('{"a": {"effects": [], "also": 1}}', "a.also = 1, expected a list of objects"),
         ('{"a": {"effects": [{}]}}', "a.effects[0].effect is missing"),
         ('{"a": {"effects": [{"effect": "gremlins"}]}}', "expected other or one of geometry"),
         ('{"a": {"effects": [{"effect": "ratio", "joint": "three"}]}}', "joint = 'three', expected a whole number"),
