@@ -36,6 +36,10 @@ SAME_BRANCH_RAD = 0.35
 LAST_STEPS = 400
 """For poses that were almost reached: next to a singular pose the last steps are slow."""
 ALMOST = 1e-4
+PRESSED, PRESS_STEPS, INSIDE = 24, 24, 1e-7
+"""From how many arrivals an arm with joints to spare is pressed into its limits, in how many steps, and how far inside
+them a joint is held."""
+PRESS_CHUNK = 256
 CHUNK = 8192
 
 
@@ -133,6 +137,7 @@ def inverse_kinematics(
         search.from_answers(form)
     for limited, effort in ((True, QUICK), (True, THOROUGH), (False, THOROUGH)):
         search.explore(limited, effort)
+    search.press()
     search.finish()
     return search.solutions()
 
@@ -266,6 +271,44 @@ class _Search:
             starts, there = table.starts(self._poses[chunk], effort)
             pose, start = np.nonzero(there)
             self._start(chunk[pose], starts[pose, start], effort.steps, effort.bent)
+
+    def press(self) -> None:
+        """Arms with joints to spare: from beyond the limits back into them, keeping the pose.
+
+        The configurations of one pose that keep the limits end, where they do not close upon themselves, with a joint
+        at one of its limits. So every joint in turn is held at either of its limits, and the others take the pose.
+        """
+        rows = np.flatnonzero((self._grade == GRADES.index(Outcome.BEYOND_LIMITS)) & ~self._settled)
+        if len(self._robot.free) <= 6:
+            return
+        for first in range(0, len(rows), PRESS_CHUNK):
+            chunk = rows[first : first + PRESS_CHUNK]
+            pose, free = _found(self._robot, self._poses[chunk], True, EXHAUSTIVE)
+            kept = self._least_beyond(pose, free)
+            for joint in range(len(self._robot.free)):
+                for end in self._robot.limits[self._robot.free[joint]] + [INSIDE, -INSIDE]:
+                    self._hold(chunk[pose[kept]], free[kept], joint, end)
+
+    def _least_beyond(self, pose: np.ndarray, free: Array) -> np.ndarray:
+        """Indices of a few arrivals of each pose: those that are least beyond the limits."""
+        net = in_limits(self._robot, self._robot.net(free), self._robot.middle)
+        beyond = self._robot.excess(self._robot.commands(net)).sum(axis=1)
+        order = np.lexsort((beyond, pose))
+        ranked = pose[order]
+        first = np.searchsorted(ranked, ranked)
+        return order[np.arange(len(order)) - first < PRESSED]
+
+    def _hold(self, rows: np.ndarray, free: Array, joint: int, command: float) -> None:
+        """Start poses that are not solved yet with one joint held at a command."""
+        open_ones = self._grade[rows] > 0
+        rows, free = rows[open_ones], free[open_ones]
+        if len(rows) == 0 or not np.isfinite(command):
+            return
+        commanded = self._robot.commands(in_limits(self._robot, self._robot.net(free), self._robot.middle))
+        commanded[:, self._robot.free[joint]] = command
+        start = self._robot.drives.net(commanded)[:, self._robot.free]
+        end = approach(self._robot, self._poses[rows], start, PRESS_STEPS, held=joint)
+        self._start(rows[end.reached], end.free[end.reached], QUICK.steps, QUICK.bent)
 
     def finish(self) -> None:
         """Go on where a pose was almost reached and nothing better was found."""

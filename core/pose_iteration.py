@@ -125,7 +125,14 @@ def rotation_vectors(rotation: Array) -> Array:
     return vectors
 
 
-def approach(robot: DrivenRobot, wanted: Array, start: Array, most_steps: int = 40, bent: bool = False) -> Approach:
+def approach(
+    robot: DrivenRobot,
+    wanted: Array,
+    start: Array,
+    most_steps: int = 40,
+    bent: bool = False,
+    held: int | None = None,
+) -> Approach:
     """Bring the tool to poses.
 
     Args:
@@ -133,6 +140,7 @@ def approach(robot: DrivenRobot, wanted: Array, start: Array, most_steps: int = 
         start: net displacements of the joints with a motor, (m, k).
         most_steps: of each pose.
         bent: whether steps follow the bend of the way, which helps next to singular poses and costs half as much again.
+        held: which of the joints with a motor stays as it is; None: none.
     """
     blocks = [slice(first, first + BLOCK) for first in range(0, len(start), BLOCK)]
     if not blocks:
@@ -140,7 +148,7 @@ def approach(robot: DrivenRobot, wanted: Array, start: Array, most_steps: int = 
 
     def work(block: slice) -> tuple[Array, Array]:
         poses = np.ascontiguousarray(np.moveaxis(wanted[block], 0, 2))
-        return _approach_block(robot, poses, start[block], most_steps, bent)
+        return _approach_block(robot, poses, start[block], most_steps, bent, held)
 
     if len(blocks) == 1:
         return Approach(*work(blocks[0]))
@@ -150,12 +158,12 @@ def approach(robot: DrivenRobot, wanted: Array, start: Array, most_steps: int = 
 
 
 def _approach_block(
-    robot: DrivenRobot, wanted: Array, start: Array, most_steps: int, bent: bool
+    robot: DrivenRobot, wanted: Array, start: Array, most_steps: int, bent: bool, held: int | None
 ) -> tuple[Array, Array]:
     best, best_misfit = np.array(start, dtype=float), np.full(len(start), np.inf)
     left = np.arange(len(start))
     free, damping, growth = best.copy(), np.ones(len(start)), np.full(len(start), 2.0)
-    missing, jacobian = _evaluate(robot, wanted, free)
+    missing, jacobian = _evaluate(robot, wanted, free, held)
     size = np.sqrt(np.sum(missing**2, axis=0))
     best_misfit[:] = size
     for _ in range(most_steps):
@@ -163,7 +171,7 @@ def _approach_block(
         if bent:
             step += _bend(robot, wanted, free, step, missing, jacobian, damping * size**2)
         trial = free + step
-        new_missing, new_jacobian = _evaluate(robot, wanted, trial)
+        new_missing, new_jacobian = _evaluate(robot, wanted, trial, held)
         new_size = np.sqrt(np.sum(new_missing**2, axis=0))
         better = new_size < size
         damping = np.where(better, np.maximum(damping * 0.3, 1e-8), damping * growth)
@@ -196,12 +204,14 @@ def _bend(
     return bend * (np.linalg.norm(bend, axis=1) < MOST_BEND / 2 * length)[:, None]
 
 
-def _evaluate(robot: DrivenRobot, wanted: Array, free: Array) -> tuple[Array, Array]:
-    """Misfits (6, m), and their negative derivative by the free displacements, (6, k, m)."""
+def _evaluate(robot: DrivenRobot, wanted: Array, free: Array, held: int | None = None) -> tuple[Array, Array]:
+    """Misfits (6, m), and their negative derivative by the free displacements, (6, k, m); none by the one held."""
     state = chain_state(robot, robot.net(free))
     jacobian, slopes = scaled_jacobian(robot, state), robot.slopes(free)
     if slopes is not None:
         jacobian = np.einsum("inm,mnk->ikm", jacobian, slopes)
+    if held is not None:
+        jacobian[:, held] = 0.0
     return misfits(robot, state, wanted), jacobian
 
 

@@ -12,6 +12,8 @@ from core.driven_robot import DrivenRobot, nominal_driven
 from core.geometry import Array
 from core.inverse_kinematics import JointSolutions, Outcome, inverse_kinematics
 from core.kinematics import forward, nominal_net
+from core.robot import Joint, JointKind
+from core.robot_builders import DhRow, robot_from_dh
 from core.rotations import vectors_of_rotations
 from core.twin.campaign import simulate_campaign
 from core.twin.irb_l6_arm import nominal_robot
@@ -20,12 +22,34 @@ from tests.benchmarks.clock import median_s, once_s
 from tests.benchmarks.tables import markdown
 
 COMPENSATED = 10_000
+QUARTER = np.pi / 2
+SEVEN = {
+    "KUKA LBR iiwa 14": (
+        ((0.36, 0), (0, 0), (0.42, 0), (0, 0), (0.4, 0), (0, 0), (0.126, 0)),
+        (-QUARTER, QUARTER, QUARTER, -QUARTER, -QUARTER, QUARTER, 0),
+        ((-170, 170), (-120, 120), (-170, 170), (-120, 120), (-170, 170), (-120, 120), (-175, 175)),
+    ),
+    "Franka Panda": (
+        ((0.333, 0), (0, 0), (0.316, 0.0825), (0, -0.0825), (0.384, 0), (0, 0.088), (0.107, 0)),
+        (-QUARTER, QUARTER, QUARTER, -QUARTER, QUARTER, QUARTER, 0),
+        ((-166, 166), (-101, 101), (-166, 166), (-176, -4), (-166, 166), (-1, 215), (-166, 166)),
+    ),
+}
+"""Arms of seven joints: d and a of each row in m, alpha in rad, and limits in degrees."""
 
 
 @cache
 def calibrated() -> CalibratedArm:
     """The paper's arm as a simulated campaign has it."""
     return calibrated_arm(calibrate(simulate_campaign(1)))
+
+
+def seven_joints(name: str) -> DrivenRobot:
+    """An arm with a joint to spare."""
+    lengths, twists, limits = SEVEN[name]
+    joints = [Joint(JointKind.REVOLUTE, tuple(np.deg2rad(ends))) for ends in limits]
+    rows = [DhRow(0.0, d, a, alpha) for (d, a), alpha in zip(lengths, twists, strict=True)]
+    return nominal_driven(robot_from_dh(name, joints, rows))
 
 
 def random_commands(robot: DrivenRobot, count: int, seed: int = 0) -> Array:
@@ -58,7 +82,8 @@ def compensation_table() -> str:
 def completeness_table(count: int) -> str:
     """Random poses made by forward kinematics within the limits, solved without any start."""
     rows = []
-    for robot in (nominal_driven(nominal_robot()), nominal_driven(scara_cell().robot)):
+    arms = [nominal_driven(nominal_robot()), nominal_driven(scara_cell().robot), *map(seven_joints, SEVEN)]
+    for robot in arms:
         poses = forward(robot.chain, robot.drives.net(random_commands(robot, count)))
         found: list[JointSolutions] = []
         seconds = once_s(lambda poses=poses, robot=robot, found=found: found.append(inverse_kinematics(robot, poses)))

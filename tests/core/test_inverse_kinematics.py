@@ -200,6 +200,44 @@ def test_seven_joints_reach_what_six_numbers_ask_for() -> None:
     np.testing.assert_allclose(forward(robot.chain, found.net), forward(robot.chain, net), rtol=0, atol=1e-8)
 
 
+def panda() -> DrivenRobot:
+    """An arm of seven joints whose limits leave little room."""
+    quarter = np.pi / 2
+    lengths = ((0.333, 0), (0, 0), (0.316, 0.0825), (0, -0.0825), (0.384, 0), (0, 0.088), (0.107, 0))
+    twists = (-quarter, quarter, quarter, -quarter, quarter, quarter, 0)
+    limits = ((-166, 166), (-101, 101), (-166, 166), (-176, -4), (-166, 166), (-1, 215), (-166, 166))
+    joints = [Joint(JointKind.REVOLUTE, tuple(np.deg2rad(ends))) for ends in limits]
+    rows = [DhRow(0.0, d, a, alpha) for (d, a), alpha in zip(lengths, twists, strict=True)]
+    return nominal_driven(robot_from_dh("panda", joints, rows))
+
+
+def test_a_joint_to_spare_is_used_to_keep_the_limits() -> None:
+    """Poses of which nearly all configurations break a limit, and some at random."""
+    robot = panda()
+    narrow = np.deg2rad(
+        [
+            [-165.55, 98.52, 103.74, -161.14, -152.63, 213.85, -141.88],
+            [69.43, -100.96, 88.28, -175.55, -155.58, 173.51, -55.35],
+            [121.98, 98.07, -79.15, -169.91, 130.4, 191.91, -0.41],
+            [114.88, -52.18, -85.75, -167.99, -161.29, 213.3, 138.95],
+        ]
+    )
+    net = np.concatenate([narrow, RNG(14).uniform(*robot.limits.T, (300, 7))])
+    found = inverse_kinematics(robot, forward(robot.chain, net))
+    assert found.solved.all()
+    assert not found.excess.any()
+    np.testing.assert_allclose(forward(robot.chain, found.net), forward(robot.chain, net), rtol=0, atol=1e-8)
+
+
+def test_a_joint_that_is_held_stays() -> None:
+    robot = panda()
+    net = RNG(15).uniform(*(0.7 * robot.limits.T), (40, 7))
+    start = net + 0.05
+    end = approach(robot, forward(robot.chain, net), start, 30, held=2)
+    np.testing.assert_array_equal(end.free[:, 2], start[:, 2])
+    assert end.reached.mean() > 0.8
+
+
 def test_whole_turns_stay_near_and_within_the_limits() -> None:
     robot = nominal_driven(wrist_arm(limit_deg=400.0))
     near = np.array([6.1, 0.6, -0.4, -6.0, 0.8, 0.3])
