@@ -103,6 +103,9 @@ def _causes(report: GapReport) -> str:
     words = [f"{'an ' if c.place.effect == UNKNOWN else ''}{cause_words(c)}" for c in report.causes[:MOST_NAMED]]
     more = len(report.causes) - len(words)
     words += [f"{more} other cause{'s' if more > 1 else ''}"] if more else []
+    if len(words) > 1 and any(len(cause.twins) > 1 for cause in report.causes):
+        # Alternatives within a list need a stronger mark between its parts.
+        words = ["; ".join([*words[:-1], f"and {words[-1]}"])]
     return capital(listed(words)) or "Nothing"
 
 

@@ -134,7 +134,13 @@ def test_switches_cover_every_cause_once(count: int) -> None:
 
 def test_a_sentence_names_a_few_causes_and_counts_the_others() -> None:
     report = replace(made("explained"), causes=made("explained").causes * 2)
-    assert "coupling from joint 3 to joint 4 and 3 other causes take" in verdict_sentence(report)
+    assert "coupling from joint 3 to joint 4; and 3 other causes take" in verdict_sentence(report)
+
+
+def test_causes_of_which_one_is_a_class_are_parted_by_semicolons() -> None:
+    classes = "or flexure of link 1; backlash of joint 3; and coupling from joint 3 to joint 4 take"
+    assert classes in verdict_sentence(made("explained"))
+    assert "Compliance of joint 2 and an unknown effect at joint 5 take" in verdict_sentence(made("partly_explained"))
 
 
 def test_what_is_left_far_above_the_floor_is_not_called_down_to_it() -> None:
