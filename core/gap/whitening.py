@@ -18,6 +18,8 @@ class Whitening:
     """Of each point, 0: left out, 1: taken in full, (m,)."""
     correlation: float = 0.0
     """Of a point's noise with that of the point before it."""
+    piece: np.ndarray | None = None
+    """Pieces that are taken as unrelated, so that one may be kept out, (m,); None: all is one."""
 
     def rows(self, values: Array, first: int = 0, before: Array | None = None) -> Array:
         """Values (r, 3, ...) of rows first.. whitened; ``before``: those of the row before the first, (1, 3, ...)."""
@@ -36,7 +38,10 @@ class Whitening:
     def _linked(self) -> np.ndarray:
         """Points whose noise follows on that of a point before that is taken, (m,)."""
         taken = self.weight > 0
-        return taken & np.concatenate([[False], taken[:-1]])
+        linked = taken & np.concatenate([[False], taken[:-1]])
+        if self.piece is not None:
+            linked[1:] &= self.piece[1:] == self.piece[:-1]
+        return linked
 
     def _one(self, values: Array, rows: slice) -> Array:
         flat = values.reshape(len(values), 3, -1)

@@ -1,4 +1,6 @@
-"""Whitening of correlated noise: exactly the inverse of its covariance, in chunks as in one go, with points left out."""
+"""Whitening of correlated noise: the inverse of its covariance, in chunks as in one go, with points left out."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -74,6 +76,17 @@ def test_points_left_out_have_no_say_and_their_neighbours_no_louder_one(correlat
     left_out = np.repeat(weight == 0, 3)
     assert np.abs(w[:, left_out]).max() == 0
     assert np.abs(w[left_out]).max() == 0
+
+
+def test_pieces_are_whitened_each_by_itself() -> None:
+    m, piece = 9, np.array([0, 0, 1, 1, 1, 0, 0, 2, 2])
+    covariance = covariances(np.random.default_rng(6), m)
+    w = matrix(replace(whitening(covariance, np.ones(m), 0.8), piece=piece), m)
+    runs = np.repeat(np.concatenate([[0], np.cumsum(np.diff(piece) != 0)]), 3)
+    apart = runs[:, None] != runs
+    assert np.abs(w[apart]).max() == 0
+    together = np.where(apart, 0.0, noise_covariance(covariance, 0.8))
+    np.testing.assert_allclose(w @ together @ w.T, np.eye(3 * m), atol=1e-10)
 
 
 def test_weights_scale_squares() -> None:
