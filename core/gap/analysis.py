@@ -11,7 +11,7 @@ from core.gap.doings import Doings, doings
 from core.gap.effects.candidate import Candidate
 from core.gap.evidence import Chosen, Evidence, joined
 from core.gap.folds import blocks
-from core.gap.kept_out import KeptOut
+from core.gap.kept_out import KNOWN, KeptOut
 from core.gap.library import candidates
 from core.gap.observations import Observations
 from core.gap.placement import place, placement_slots, with_placement
@@ -26,8 +26,9 @@ GEOMETRY_PRIORS = (3e-5, 1e-4)
 """How well a calibrated sim's geometry may be known, rad and m; the data choose."""
 AS_CALIBRATED, UNCALIBRATED = 1e-4, 3e-3
 """Geometry known so well is what a calibration leaves; beyond, it is itself a cause."""
-GEOMETRY_CLOSES = 0.5
-"""Part of the kept-out mean square that is left at most when the geometry of a whole sim is off."""
+STRAY, GEOMETRY_CLOSES = 2.5, 0.5
+"""The geometry of a whole sim is off where its numbers stray by so many calibrated sizes, rms, and where letting them
+leaves at most such a part of the kept-out mean square."""
 NULL_QUANTILE, NULL_MARGIN = 0.9, 3.0
 """Of the largest evidence that noise alone makes; beyond a quantile it falls off as exp(-x)."""
 MOST_FLEXIBLE = 4
@@ -182,10 +183,10 @@ def _rescaled(covariance: Array, variance: float) -> Array:
 
 def _best_prior(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
     """The geometry prior under which everything together is most probable, and what is found with it."""
-    if _geometry_is_off(problem):
-        return _with_geometry(problem)
     tried = [_with_prior(problem, prior) for prior in GEOMETRY_PRIORS]
     _, *best = max(tried, key=lambda one: one[0])
+    if _geometry_is_off(problem, best[0], best[3]):
+        return _with_geometry(problem)
     return (*best, Chosen())
 
 
@@ -196,12 +197,15 @@ def _with_prior(problem: Problem, prior: float) -> tuple[float, Evidence, float,
     return found.log_evidence + evidence.nuisance_evidence, evidence, prior, threshold, found
 
 
-def _geometry_is_off(problem: Problem) -> bool:
-    """Whether changes of geometry beyond what a calibration leaves predict points that they were not fitted to."""
+def _geometry_is_off(problem: Problem, evidence: Evidence, found: Found) -> bool:
+    """Whether the geometry strays beyond what a calibration leaves even with all that was found beside it."""
+    _, estimate = numbers(problem, evidence, UNCALIBRATED, found.chosen)
+    strays = estimate[problem.placement : problem.nuisance] / AS_CALIBRATED
+    if not np.sum(strays**2) > STRAY**2 * len(strays):
+        return False
     fold = blocks(problem.sim.seen)
-    closely, freely = (
-        KeptOut(problem, fold, prior, ()).square_m2(Chosen()) for prior in (GEOMETRY_PRIORS[-1], UNCALIBRATED)
-    )
+    kept = [KeptOut(problem, fold, prior, found.chosen.groups) for prior in (KNOWN, UNCALIBRATED)]
+    closely, freely = (one.square_m2(found.chosen) for one in kept)
     return freely < GEOMETRY_CLOSES * closely
 
 

@@ -169,8 +169,16 @@ class Findings:
 
     @cached_property
     def kept(self) -> KeptOut:
+        """Models of causes with the small changes of geometry as they are: what each cause closes."""
         everything = joined(self.analysis.given, self.chosen, _chosen(self.stands), self.judge.rest, self.judge.lone)
-        return KeptOut(self.analysis.problem, self.fold, self.analysis.geometry_prior, everything.groups)
+        return KeptOut(
+            self.analysis.problem, self.fold, self.analysis.geometry_prior, everything.groups, self.judge.geometry
+        )
+
+    @cached_property
+    def honest(self) -> KeptOut:
+        """All named causes, with geometry found anew by every fit: how good the corrected sim is."""
+        return KeptOut(self.analysis.problem, self.fold, self.analysis.geometry_prior, self.chosen.groups)
 
     @cached_property
     def gap_m2(self) -> float:
@@ -180,13 +188,13 @@ class Findings:
     @cached_property
     def left_m2(self) -> float:
         """With all named causes."""
-        return self.kept.square_m2(self.chosen)
+        return self.honest.square_m2(self.chosen)
 
     @cached_property
     def left_m(self) -> Array:
         """Residuals after all named causes, fitted on all points, (m, 3)."""
-        index, numbers, _ = self.kept.fitted(self.chosen)
-        return self.analysis.problem.residual_m - self.kept.plain[:, :, index] @ numbers
+        index, numbers, _ = self.honest.fitted(self.chosen)
+        return self.analysis.problem.residual_m - self.honest.plain[:, :, index] @ numbers
 
     def _placed_left(self) -> Array:
         """Residuals with base and targets alone, about their own placement, each fold from the others, (m, 3)."""
@@ -331,7 +339,7 @@ def _parameters(found: Findings, stand: Stand) -> tuple[Parameter, ...]:
     if stand.unknown:
         return ()
     problem = found.analysis.problem
-    _, numbers, covariance = found.kept.fitted(found.chosen)
+    _, numbers, covariance = found.honest.fitted(found.chosen)
     at = _position(found, found.chosen, stand.groups[0])
     candidate = problem.candidates[stand.groups[0]]
     scale = problem.design.scale[problem.slices[stand.groups[0]]]
@@ -395,7 +403,7 @@ def _best_closure(found: Findings) -> float:
 def _corrected(arm: CalibratedArm | None, found: Findings) -> CorrectedSim:
     a = found.analysis
     problem = a.problem
-    _, numbers, _ = found.kept.fitted(found.chosen)
+    _, numbers, _ = found.honest.fitted(found.chosen)
     scaled = numbers * np.concatenate(
         [
             problem.design.scale[: problem.nuisance],

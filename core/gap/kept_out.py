@@ -1,7 +1,7 @@
 """How well models predict points that they have not seen, fold by fold."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,10 @@ from core.gap.evidence import Chosen
 from core.gap.folds import CHECK, placeable
 from core.gap.problem import Problem
 from core.geometry import Array
+
+
+KNOWN = 1e-9
+"""Prior of geometry that is taken as known, rad and m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +26,8 @@ class KeptOut:
     geometry_prior: float
     groups: tuple[int, ...]
     """Candidates that models can be made of."""
+    geometry: Array | None = None
+    """Changes of geometry that are taken as known, in the units of their columns; None: every fit finds its own."""
 
     @cached_property
     def _columns(self) -> np.ndarray:
@@ -33,6 +39,14 @@ class KeptOut:
     def plain(self) -> Array:
         """Columns over points, m for one unknown number, (m, 3, u)."""
         return self.problem.design.some(self._columns).whole()
+
+    @cached_property
+    def residual_m(self) -> Array:
+        """Residuals without what known geometry makes, (m, 3)."""
+        if self.geometry is None:
+            return self.problem.residual_m
+        own = slice(self.problem.placement, self.problem.nuisance)
+        return self.problem.residual_m - self.plain[:, :, own] @ self.geometry
 
     @cached_property
     def judged(self) -> np.ndarray:
@@ -49,15 +63,15 @@ class KeptOut:
         squares, pulls, totals = np.zeros((CHECK + 1, u, u)), np.zeros((CHECK + 1, u)), np.zeros(CHECK + 1)
         for f in range(CHECK + 1):
             mine = (self.fold == f) & self.judged
-            flat, aim = self.plain[mine].reshape(-1, u), self.problem.residual_m[mine].ravel()
+            flat, aim = self.plain[mine].reshape(-1, u), self.residual_m[mine].ravel()
             squares[f], pulls[f], totals[f] = flat.T @ flat, flat.T @ aim, aim @ aim
         return squares, pulls, totals
 
     @cached_property
     def _sums(self) -> tuple[Array, Array]:
         """Whitened squares and pulls of each fold, (folds, u, u) and (folds, u)."""
-        white = self.problem.white
-        x, y = white.rows(self.plain), white.rows(self.problem.residual_m)
+        white = replace(self.problem.white, piece=self.fold)
+        x, y = white.rows(self.plain), white.rows(self.residual_m)
         squares, pulls = [], []
         for f in range(CHECK + 1):
             mine = self.fold == f
@@ -76,15 +90,19 @@ class KeptOut:
         own = [np.arange(starts[g], starts[g] + widths[g]) for g in chosen.groups]
         index = np.concatenate([np.arange(self.problem.nuisance), *own]).astype(int)
         prior = [np.full(widths[g], 1 / s**2) for g, s in zip(chosen.groups, chosen.sizes, strict=True)]
-        return index, np.concatenate([self.problem.nuisance_precision(self.geometry_prior), *prior])
+        return index, np.concatenate([self._nuisance_precision, *prior])
+
+    @property
+    def _nuisance_precision(self) -> Array:
+        return self.problem.nuisance_precision(self.geometry_prior if self.geometry is None else KNOWN)
 
     def left_m(self, chosen: Chosen) -> Array:
         """Residuals of every point, predicted from the other folds, (m, 3)."""
         index, _ = self.index(chosen)
-        out = np.empty_like(self.problem.residual_m)
+        out = np.empty_like(self.residual_m)
         for f, numbers in self._by_fold(chosen):
             mine = self.fold == f
-            out[mine] = self.problem.residual_m[mine] - self.plain[mine][:, :, index] @ numbers
+            out[mine] = self.residual_m[mine] - self.plain[mine][:, :, index] @ numbers
         return out
 
     def square_m2(self, chosen: Chosen) -> float:

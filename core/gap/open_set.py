@@ -14,6 +14,7 @@ from core.gap.evidence import Chosen, Evidence, joined
 from core.gap.kept_out import KeptOut
 from core.gap.problem import Problem
 from core.gap.result import Place
+from core.geometry import Array
 
 LEAST_SHARE = 0.05
 """Of the gap: what closes less is an imperfection of a stronger cause, or clutter."""
@@ -92,7 +93,20 @@ class Judge:
         groups = dict.fromkeys(self.everything.groups)
         for chosen in (self.rest, self.lone, *self.local.values()):
             groups |= dict.fromkeys(chosen.groups)
-        return KeptOut(self.problem, self.fold, self.geometry_prior, tuple(groups))
+        return KeptOut(self.problem, self.fold, self.geometry_prior, tuple(groups), self.geometry)
+
+    @cached_property
+    def geometry(self) -> Array:
+        """Small changes of geometry as everything that was found leaves them.
+
+        Taken as known: a model without a cause must not hide the loss behind a geometry that nobody believes in.
+        """
+        everything = joined(self.everything, self.rest)
+        problem = self.problem
+        index = np.concatenate([np.arange(problem.nuisance), self.evidence.index(everything.groups)]).astype(int)
+        prior = np.concatenate([self.evidence.precision, self.evidence.prior(everything)])
+        square = problem.sums.square[np.ix_(index, index)] + np.diag(prior)
+        return np.linalg.solve(square, problem.sums.pull[index])[problem.placement : problem.nuisance]
 
     @cached_property
     def base_m2(self) -> float:
@@ -149,7 +163,18 @@ def stands(judge: Judge) -> list[Stand]:
         out += _at(
             judge, variable, _pick(kept, members), _pick(kept, [k for k in range(len(kept.groups)) if k not in members])
         )
-    return out
+    return _steps_together(out)
+
+
+def _steps_together(found: list[Stand]) -> list[Stand]:
+    """Steps of the encoders of several joints are one cause."""
+    steps = [one for one in found if one.place.effect == "quantisation"]
+    if len(steps) < 2:
+        return found
+    together = joined(*(Chosen(one.groups, one.sizes) for one in steps))
+    local = min(one.local for one in steps)
+    rest = [one for one in found if one.place.effect != "quantisation"]
+    return [*rest, Stand(Place("quantisation"), together.groups, together.sizes, local)]
 
 
 def _worth_naming(judge: Judge, chosen: Chosen) -> Chosen:
@@ -173,9 +198,9 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen) -> list[St
     order = list(np.argsort(closes)[::-1])
     first = order[0]
     share = closes[first] / max(ceiling, 1e-300)
-    if share >= LOCALLY:
-        return [_stand(judge, here, [first], share)]
     same = [k for k in order if _place(judge, here, k).same_as(_place(judge, here, first))]
+    if share >= LOCALLY:
+        return [_stand(judge, here, same if _place(judge, here, first).effect in COMPLETED else [first], share)]
     if len(same) > 1 and _place(judge, here, first).effect in COMPLETED:
         together = (without - judge.square(joined(elsewhere, _pick(here, same)))) / max(ceiling, 1e-300)
         if together >= LOCALLY:

@@ -10,7 +10,7 @@ from core.gap.evidence import Chosen, joined
 from core.gap.open_set import LOCALLY, Judge, Stand
 from core.gap.result import Place
 
-FORM_ERROR = 0.004
+FORM_ERROR = 0.002
 """Share of the evidence that rough forms of effects can be wrong by."""
 NAMED_AT, NAMED_WIDTH = LOCALLY, 0.012
 TWIN_ODDS = 0.05

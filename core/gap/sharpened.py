@@ -16,9 +16,10 @@ FINER = 25
 COARSEST_STEP_RAD, COARSEST_STEP_M = 0.06, 0.02
 SPECTRUM_BINS = 1 << 18
 """Over the span of a joint."""
-PEAK = 14.0
+PEAK = 20.0
 """A line of the spectrum must stand so many times above its neighbourhood."""
-STEPS_AROUND = 61
+STEPS_AROUND, ALIKE_AROUND = 41, 61
+PHASES = tuple(float(phase) for phase in np.arange(8) / 8)
 
 
 def sharpened(
@@ -102,7 +103,7 @@ class Spectrum:
         if self.span < 4 * (COARSEST_STEP_M if self.sliding else COARSEST_STEP_RAD) / 3:
             return None
         best = None
-        for k in _largest(self.power, 6):
+        for k in _largest(self.power, 3):
             if self.power[k] > PEAK:
                 found = self.saw_near(2 * self.span / k)
                 best = found if best is None or found[0] > best[0] else best
@@ -113,13 +114,19 @@ class Spectrum:
         best = (0.0, step, 0.0)
         width = step**2 / self.span / 2
         for size in step + width * np.linspace(-1, 1, STEPS_AROUND):
-            for phase in (0.0, 0.5):
-                teeth = drives.saw(self.x, size, phase)
-                pull, square = teeth @ self.error, teeth**2 @ self.strength
-                gain = float(pull * abs(pull) / max(square, 1e-300))
-                if gain > best[0]:
-                    best = (gain, float(size), phase)
+            for phase in PHASES:
+                best = max(best, (self.explained(size, phase), float(size), phase))
         return best
+
+    def best_phase(self, step: float) -> tuple[float, float]:
+        """Energy that steps of a size explain at their best phase, and that phase."""
+        return max((self.explained(step, phase), phase) for phase in PHASES)
+
+    def explained(self, step: float, phase: float) -> float:
+        """Energy that steps explain; negative where the saw-teeth would have to be turned round."""
+        teeth = drives.saw(self.x, step, phase)
+        pull, square = teeth @ self.error, teeth**2 @ self.strength
+        return float(pull * abs(pull) / max(square, 1e-300))
 
 
 def _largest(values: Array, count: int) -> np.ndarray:
@@ -138,13 +145,17 @@ def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | No
         total += spectrum.power[place]
     if total.max() < PEAK + 2 * len(spectra):
         return None
-    best: tuple[float, dict[int, tuple[float, float]]] | None = None
-    for k in _largest(total, 4):
-        found = {s.joint: s.saw_near(1 / waves[k]) for s in spectra}
-        gain = sum(one[0] for one in found.values())
-        if best is None or gain > best[0]:
-            best = (gain, {joint: one[1:] for joint, one in found.items()})
-    return None if best is None else best[1]
+    return max((_alike_near(spectra, 1 / waves[k]) for k in _largest(total, 3)), key=lambda found: found[0])[1]
+
+
+def _alike_near(spectra: list[Spectrum], step: float) -> tuple[float, dict[int, tuple[float, float]]]:
+    """Steps of one size, counted alike, near a size: the energy that they explain, and size and phase by joint."""
+    farthest = max(float(np.abs(spectrum.x).max()) for spectrum in spectra)
+    best = (0.0, step)
+    for width in (step**2 / min(spectrum.span for spectrum in spectra), step**2 / farthest):
+        for size in best[1] + width * np.linspace(-1, 1, ALIKE_AROUND):
+            best = max(best, (sum(spectrum.best_phase(size)[0] for spectrum in spectra), float(size)))
+    return best[0], {spectrum.joint: (best[1], spectrum.best_phase(best[1])[1]) for spectrum in spectra}
 
 
 def _mesh(sim: Sim, doings: Doings, joint: int, candidate: Candidate, aim_m: Array, weight: Array) -> Candidate:
