@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.scene.colours import FITTED_AXIS, HIGHLIGHT, NOMINAL_AXIS, Rgb, round_down
-from app.scene.group import SceneGroup, Viewer, add_solid
+from app.scene.group import SceneGroup, Viewer, add_frame, add_solid
 from app.scene.poses import link_motions, pose_of
 from app.scene.solids import Solid, arrow, lathe
 from core.geometry import Array, Line
@@ -146,7 +146,7 @@ class AxesView(SceneGroup):
             label.visible = visible
 
     def _node(self, mark: AxisMark) -> "viser.FrameHandle":
-        return self._scene.add_frame(f"{self._root}/{mark.joint}", show_axes=False, position=mark.middle_m)
+        return add_frame(self._scene, f"{self._root}/{mark.joint}", mark.middle_m)
 
     def _arrow(self, mark: AxisMark, colour: Rgb, radius_m: float) -> "viser.MeshHandle":
         solid = axis_arrow(mark, self._length, radius_m).about(mark.middle_m)

@@ -3,6 +3,9 @@
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from app.scene.colours import Rgb
 from app.scene.solids import Solid
 
@@ -35,6 +38,18 @@ class SceneGroup:
     def remove(self) -> None:
         """Take all of it out of the scene."""
         self._top.remove()
+
+
+def add_frame(scene: "viser.SceneApi", name: str, position_m: ArrayLike = (0.0, 0.0, 0.0)) -> "viser.FrameHandle":
+    """A node without a shape of its own, for others to ride on, not turned.
+
+    A node that is taken away and made again at once keeps its old pose in the browsers, unless the new one is said; and
+    viser does not say what is as it always is at first. So the frame is turned and shifted there and back.
+    """
+    place = np.asarray(position_m, dtype=float)
+    frame = scene.add_frame(name, show_axes=False, wxyz=(0.0, 1.0, 0.0, 0.0), position=place + 1.0)
+    frame.wxyz, frame.position = (1.0, 0.0, 0.0, 0.0), place
+    return frame
 
 
 def add_solid(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.scene.colours import ARM, Rgb, shaded
-from app.scene.group import SceneGroup, Viewer, add_solid
+from app.scene.group import SceneGroup, Viewer, add_frame, add_solid
 from app.scene.link_shapes import Skeleton, link_shapes, skeleton
 from app.scene.linkage import linkages
 from app.scene.poses import link_motions, pose_of
@@ -107,7 +107,7 @@ class RobotView(SceneGroup):
         return motion[:3, :3] @ self.bones.tool_m + motion[:3, 3]
 
     def _frame(self, name: str, position: Array) -> "viser.FrameHandle":
-        return self._scene.add_frame(name, show_axes=False, position=position)
+        return add_frame(self._scene, name, position)
 
     def _draw_links(self, colour: Rgb, swell_m: float) -> None:
         for k, shape in enumerate(link_shapes(self.bones, swell_m)):

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from app.scene.colours import GREY, INSTRUMENT, SIGHT_LINE, shaded
-from app.scene.group import SceneGroup, Viewer, add_solid
+from app.scene.group import SceneGroup, Viewer, add_frame, add_solid
 from app.scene.solids import Solid, barrel, merged, tube
 from core.geometry import Array
 
@@ -90,11 +90,11 @@ class StationsView(SceneGroup):
 
     def _station(self, k: int, station: Station, floor_m: float) -> tuple["viser.FrameHandle", "viser.FrameHandle"]:
         root = f"{self._root}/{k}"
-        self._scene.add_frame(root, show_axes=False, position=station.position_m)
+        add_frame(self._scene, root, station.position_m)
         add_solid(self._scene, f"{root}/tripod", tripod(max(float(station.position_m[2]) - floor_m, 0.25)), GREY)
-        head = self._scene.add_frame(f"{root}/head", show_axes=False)
+        head = add_frame(self._scene, f"{root}/head")
         add_solid(self._scene, f"{root}/head/body", alidade(), INSTRUMENT)
-        scope = self._scene.add_frame(f"{root}/head/telescope", show_axes=False)
+        scope = add_frame(self._scene, f"{root}/head/telescope")
         add_solid(self._scene, f"{root}/head/telescope/body", telescope(), shaded(GREY, 0.5))
         self._scene.add_label(f"{root}/label", station.name[:32], position=(0, 0, 0.14), anchor="bottom-center")
         return head, scope

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.scene.colours import GREEN, GREY, HIGHLIGHT
-from app.scene.group import add_solid
+from app.scene.group import add_frame, add_solid
 from app.scene.link_shapes import Skeleton
 from app.scene.robot import RobotView
 from app.scene.solids import ball, tube
@@ -75,7 +75,7 @@ class TargetsView:
 
     def _draw(self, k: int, target: Target, point: Array, robot: RobotView) -> None:
         root = f"{robot.link_node(target.link)}/target{k}"
-        self._scene.add_frame(root, show_axes=False, position=point - robot.origin_m(target.link))
+        add_frame(self._scene, root, point - robot.origin_m(target.link))
         name = f"{root}/ball"
         self._balls[k] = (name, add_solid(self._scene, name, ball(np.zeros(3), self._radius), GREEN))
         foot = foot_on_link(robot.bones, target.link, point) - point

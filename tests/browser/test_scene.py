@@ -29,6 +29,7 @@ from app.scene.stations import Station, StationsView
 from app.scene.targets import TargetsView
 from core.arm import carry
 from core.calibration import Calibration
+from core.geometry import Line
 from core.phi_model import axes
 from tests.app.report_cases import six_joints
 
@@ -297,3 +298,20 @@ def test_pictures(opened, folder: Path) -> None:
     demo.diagnosis.highlight(2, "b_m")
     look(demo, page, demo.diagnosis.camera(2, "b_m"))
     page.screenshot(path=folder / f"scene_highlight_{theme}.png")
+
+
+def test_an_arm_that_is_drawn_anew_stands_where_it_should(opened) -> None:
+    _, demo, page = opened
+    lines = (Line([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]), Line([0.4, 0.0, 0.0], [0.0, 0.0, 1.0]))
+    first = RobotView(demo.server, "/other", lines, np.zeros(2, dtype=bool))
+    first.show([1.0, 0.5])
+    before = world(page, "/calibrated/link0")
+    frame = before.copy()
+    frame[:3, 3] -= frame[:3, :3] @ demo.robot.origin_m(0)
+    until(lambda: page.evaluate(WORLD, "/other/link2") is not None)
+    until(lambda: not np.allclose((np.linalg.inv(frame) @ world(page, "/other/link1"))[:3, :3], np.eye(3), atol=1e-5))
+    first.remove()
+    second = RobotView(demo.server, "/other", lines, np.zeros(2, dtype=bool))
+    until(lambda: np.allclose((np.linalg.inv(frame) @ world(page, "/other/link1"))[:3, :3], np.eye(3), atol=1e-5))
+    until(lambda: np.allclose((np.linalg.inv(frame) @ world(page, "/other/link2"))[:3, 3], [0.4, 0.0, 0.0], atol=1e-5))
+    second.remove()
