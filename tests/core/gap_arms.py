@@ -1,7 +1,7 @@
 """Arms, campaigns and placed sims put together by hand, for tests of what the diagnosis of the gap is computed from."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from random_arms import random_model, random_motion
@@ -126,19 +126,67 @@ def net_of_motors(sim: Sim, active: Array) -> Array:
     return net
 
 
-def arc_rows(robot: Robot, joint: int, places: Array, centre: Array, sweep: int = 1) -> dict[str, object]:
-    """Columns of one sweep of a joint (1..n) through places, forwards or backwards as they come."""
-    m = len(places)
-    commanded = np.tile(np.asarray(centre, dtype=float), (m, 1))
-    commanded[:, joint - 1] = places
-    approach = np.zeros((m, robot.joint_count), dtype=int)
-    approach[:, joint - 1] = np.sign(places[-1] - places[0])
-    return {
-        "phase": np.full(m, SWEEP, dtype=object),
-        "joint": np.full(m, joint),
-        "sweep": np.full(m, sweep),
-        "step": np.arange(m),
-        "pose": np.full(m, -1),
-        "commanded": commanded,
-        "approach": approach,
-    }
+@dataclass(frozen=True)
+class Day:
+    """How much is measured in ``day``."""
+
+    arc: int = 9
+    """Points of each arc, there and back again."""
+    poses: int = 30
+    visits: int = 1
+    """How often each pose is visited."""
+    reach: float = 1.2
+    """Half width of the arcs, rad (m: a tenth)."""
+    shots: int = 1
+    """Targets seen at each standstill."""
+
+
+def day(robot: Robot, seed: int, plan: Day = Day(), noise_m: float = 0.0) -> Sim:  # noqa: B008
+    """A sim as a day of measuring shows it: arcs of every joint both ways, poses, changing loads, speeds, temperatures.
+
+    The points are where the sim has them, with white noise.
+    """
+    rng = np.random.default_rng(seed)
+    n, targets = robot.joint_count, random_targets(rng, robot)
+    reach = np.where(robot.sliding, 0.1, 1.0) * plan.reach
+    centre = 0.3 * reach * rng.uniform(-1, 1, n)
+    stops = [stop for j in range(n) for stop in _arc(j, centre, reach, plan.arc)]
+    drawn = reach * rng.uniform(-1, 1, (plan.poses, n))
+    stops += [(POSE, 0, -1, k, drawn[k]) for _ in range(plan.visits) for k in range(plan.poses)]
+    phase, joint, step, _, _ = (np.array(column, dtype=object) for column in zip(*stops, strict=True))
+    m = len(stops) * plan.shots
+    stop = np.repeat(np.arange(len(stops)), plan.shots)
+    commanded = np.array([place for *_, place in stops])
+    sense = np.sign(np.diff(commanded, axis=0, prepend=commanded[:1] - 0.1)).astype(int)
+    warm = 1 - np.exp(-np.arange(m) / m)
+    rows = table(
+        commanded[stop],
+        np.arange(m) % len(targets),
+        phase=phase[stop],
+        joint=joint[stop].astype(int),
+        sweep=(joint[stop] > 0).astype(int),
+        step=step[stop].astype(int),
+        pose=np.where(joint[stop] > 0, -1, stop),
+        approach=sense[stop],
+        time_s=30.0 * np.arange(m),
+        temperature_c=21.0 + np.sin(np.arange(m) / 9.0),
+        arm_temperature_c=22.0 + 6.0 * warm,
+        payload_kg=np.where(np.arange(m) * 2 < m, 0.0, 4.0),
+        speed=rng.uniform(-0.3, 0.3, (len(stops), n))[stop],
+        torque_nm=rng.uniform(-30, 30, (len(stops), n))[stop],
+        readback=commanded[stop] + 1e-3 * rng.normal(size=(m, n)),
+    )
+    sim = Sim(observe(campaign(robot, targets, rows)), random_motion(rng), _off_axis(rng, len(targets)), np.zeros(3))
+    return measured_at(sim, sim.points_m() + noise_m * rng.normal(size=(m, 3)))
+
+
+def _arc(joint: int, centre: Array, reach: Array, points: int) -> list[tuple[str, int, int, int, Array]]:
+    places = np.linspace(-1, 1, points) * reach[joint]
+    along = np.eye(len(centre))[joint]
+    there = [(SWEEP, joint + 1, k, -1, centre + place * along) for k, place in enumerate(places)]
+    return there + there[::-1]
+
+
+def _off_axis(rng: np.random.Generator, targets: int) -> Array:
+    turn = rng.uniform(0, 2 * np.pi, targets)
+    return np.stack([0.15 * np.cos(turn), 0.15 * np.sin(turn), rng.uniform(0.05, 0.2, targets)], axis=1)
