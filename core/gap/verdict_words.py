@@ -22,6 +22,12 @@ def verdict_sentence(report: GapReport) -> str:
     """What is known of the gap, in one sentence. Texts from files are in it as they are."""
     gap, left, floor = (length_words(v) for v in (report.gap_rms_m, report.left_rms_m, report.noise.floor_rms_m))
     match report.verdict:
+        case Verdict.NO_GAP if report.gap_rms_m > NEAR_FLOOR * report.noise.floor_rms_m:
+            return (
+                f"No gap can be shown: on points kept out of the fits real and sim differ by {gap} where noise alone "
+                f"would leave {floor}, but these data are too few or too one-sided to tell a gap from where the base "
+                "and the targets stand."
+            )
         case Verdict.NO_GAP:
             return (
                 f"No gap beyond the noise: real and sim differ by {gap}, and {floor} is what noise and the arm's own "

@@ -143,6 +143,11 @@ def test_causes_of_which_one_is_a_class_are_parted_by_semicolons() -> None:
     assert "Compliance of joint 2 and an unknown effect at joint 5 take" in verdict_sentence(made("partly_explained"))
 
 
+def test_data_that_cannot_show_a_gap_are_not_said_to_have_none() -> None:
+    assert verdict_sentence(made("no_gap")).startswith("No gap beyond the noise")
+    assert verdict_sentence(replace(made("no_gap"), gap_rms_m=3e-2)).startswith("No gap can be shown: on points kept")
+
+
 def test_what_is_left_far_above_the_floor_is_not_called_down_to_it() -> None:
     assert "which is down to the noise" in verdict_sentence(made("explained"))
     sentence = verdict_sentence(replace(made("explained"), left_rms_m=6e-4))
