@@ -15,7 +15,7 @@ from core.session_families import COUPLING_FAMILIES, coupling_key, drive_familie
 from core.solve_figures import changes
 
 if TYPE_CHECKING:
-    pass
+    from core.calibration import Calibration
 
 AS_DESIGNED = "as in robot.toml"
 
@@ -26,6 +26,7 @@ class SolvePanel:
     def __init__(self, gui: viser.GuiApi, bench: Workbench, ask: Callable) -> None:
         self._bench, self._ask = bench, ask
         self._shown: tuple | None = None
+        self._found: Calibration | None = None
         gui.add_html(
             block(
                 "<h3>Solve</h3><p>Axes, drives, couplings and the arm's parameters from all shots that count. "
@@ -59,10 +60,10 @@ class SolvePanel:
             box.value = str(state.settings.get(key, AS_DESIGNED))
         found, since, limits = bench.calibration, bench.since_solved, limits_of(state.settings)
         last = state.solves[-1] if state.solves else None
-        shown = found, since, limits, None if last is None else last.id, bool(state.shots)
-        if shown == self._shown:
+        shown = since, limits, None if last is None else last.id, bool(state.shots)
+        if found is self._found and shown == self._shown:
             return
-        self._shown = shown
+        self._found, self._shown = found, shown
         if found is None:
             self._words.content = unsolved_words(last, since, len(state.shots))
         else:
