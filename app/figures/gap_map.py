@@ -126,19 +126,23 @@ def _links(report: GapReport, grid: Grid) -> list[Trace]:
 
 
 def _marks(report: GapReport, grid: Grid, full: float) -> list[Trace]:
-    """The number of each cause; with a question mark where a twin of it stands."""
-    marks: dict[tuple[str, str], str] = {}
-    dark: dict[tuple[str, str], bool] = {}
+    """The numbers of causes where they stand; with a question mark where only a twin of them does."""
+    numbers: dict[tuple[str, str], list[str]] = {}
+    certain, dark = set(), set()
     for number, cause in enumerate(report.causes, 1):
         for place in cause.twins or (cause.place,):
             spot = grid.spot(place)
-            if spot is not None:
-                cell = grid.cells.get((place.effect, spot[0]))
-                dark[spot] = cell is not None and cell.share_closed >= STRONG * full
-                text = f"{number}" if place == cause.place else f"{number}?"
-                marks[spot] = f"{marks[spot]} {text}" if spot in marks else text
-    groups = ((True, {"color": "white"}), (False, {}))
-    return [_texts({s: t for s, t in marks.items() if dark[s] is group}, look) for group, look in groups]
+            if spot is None:
+                continue
+            numbers.setdefault(spot, []).append(str(number))
+            cell = grid.cells.get((place.effect, spot[0]))
+            if cell is not None and cell.share_closed >= STRONG * full:
+                dark.add(spot)
+            if place == cause.place:
+                certain.add(spot)
+    texts = {spot: f"{','.join(all_)}{'' if spot in certain else '?'}" for spot, all_ in numbers.items()}
+    groups = ((dark, {"color": "white"}), (texts.keys() - dark, {}))
+    return [_texts({s: t for s, t in texts.items() if s in group}, look) for group, look in groups]
 
 
 def _texts(marks: dict[tuple[str, str], str], look: dict) -> Trace:
@@ -148,7 +152,7 @@ def _texts(marks: dict[tuple[str, str], str], look: dict) -> Trace:
         "y": [row for _, row in marks],
         "text": [f"<b>{text}</b>" for text in marks.values()],
         "mode": "text",
-        "textfont": {"size": 13, **look},
+        "textfont": {"size": [13 if len(text) < 4 else 10 for text in marks.values()] or 13, **look},
         "hoverinfo": "skip",
         "showlegend": False,
     }
