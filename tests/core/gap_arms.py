@@ -141,8 +141,8 @@ class Day:
     """Targets seen at each standstill."""
 
 
-def day(robot: Robot, seed: int, plan: Day = Day(), noise_m: float = 0.0) -> Sim:  # noqa: B008
-    """A sim as a day of measuring shows it: arcs of every joint both ways, poses, changing loads, speeds, temperatures.
+def day(robot: Robot, seed: int, plan: Day = Day(), noise_m: float = 0.0) -> Sim:
+    """A sim as a day of measuring shows it: arcs both ways, poses, changing loads, speeds, temperatures.
 
     The points are where the sim has them, with white noise.
     """

@@ -1,4 +1,4 @@
-"""Columns and their sums: in chunks as in one go, scaled alike, the noise that is drawn beside them as white as said."""
+"""Columns and their sums: in chunks as in one go, scaled alike; the noise that is drawn beside them is white."""
 
 from dataclasses import replace
 
@@ -74,7 +74,7 @@ def test_motions_are_what_columns_are_the_derivative_of() -> None:
 
 
 def test_every_group_is_one_noise_standard_deviation_rms() -> None:
-    """Mean square over coordinates of a group's columns, averaged over the group; 0 where no point that counts moves."""
+    """Mean square over coordinates and columns of a group; 0 where no point that counts moves."""
     problem, _ = posed("coupled", 4)
     diagonal = np.diag(problem.sums.square) / problem.sums.count
     unit = np.array([diagonal[group].mean() for group in problem.slices])
