@@ -66,10 +66,18 @@ def _grid(report: GapReport) -> Grid:
         if key not in cells or cell.share_closed > cells[key].share_closed:
             cells[key] = cell
     there = {effect for effect, _ in cells}
+    if there:
+        there = {place.effect for place in _places(report)}
     effects = [*(e for e in NAMES if e in there), *sorted(there - set(NAMES))]
     columns = [str(k) for k in range(1, report.campaign.robot.joint_count + 1)]
-    others = sorted({column for _, column in cells} - set(columns))
+    others = [NOWHERE] if NOWHERE in {column_of(place) for place in _places(report)} else []
     return Grid(tuple(effects), tuple([*columns, *others]), cells)
+
+
+def _places(report: GapReport) -> list[Place]:
+    """Every place that has a cell or is a cause, or a twin of one."""
+    causes = [place for cause in report.causes for place in (cause.place, *cause.twins)]
+    return [*(cell.place for cell in report.evidence_map), *causes]
 
 
 def _full(grid: Grid) -> float:

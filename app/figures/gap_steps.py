@@ -20,7 +20,7 @@ MOST_CAUSES = 8
 """With a bar of their own."""
 SAME = 0.02
 """Lengths that differ by less are drawn as one."""
-TOGETHER = "All of them fitted together"
+TOGETHER = "Left with all of them"
 FLOOR_NAMES = {
     "repeats": "Floor: repeated measurements scatter so",
     "sigma": "Floor: the instrument's noise",

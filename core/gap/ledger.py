@@ -7,7 +7,7 @@ from core.gap.place_words import cause_words
 from core.gap.result import GapReport
 from core.geometry import Array
 
-FITTED_TOGETHER = "by fitting all of them together"
+NOT_SHARED = "not shared out among the causes"
 BEYOND, FLOOR = "left, beyond the floor", "floor: noise and the arm's own repeatability"
 NEGLIGIBLE = 1e-6
 MOST_SWITCHES = 5
@@ -35,7 +35,7 @@ def ledger(report: GapReport) -> tuple[LedgerLine, ...]:
     rest = [(BEYOND, report.left_rms_m**2 - floor), (FLOOR, floor)]
     together = whole - sum(square for _, square in [*parts, *rest])
     if abs(together) > NEGLIGIBLE * whole:
-        parts.append((FITTED_TOGETHER, together))
+        parts.append((NOT_SHARED, together))
     share = 1.0 / whole if whole > 0 else math.nan
     return tuple(LedgerLine(words, square, square * share) for words, square in [*parts, *rest])
 

@@ -196,3 +196,11 @@ def test_small_shares_are_seen_on_the_map() -> None:
     )
     assert gap_map_figure(report).data[0].zmax == 1.0
     assert gap_map_figure(small).data[0].zmax == 0.1
+
+
+def test_an_unknown_cause_has_its_mark_on_the_map() -> None:
+    figure = gap_map_figure(made("partly_explained"))
+    marks = {
+        t: (x, y) for trace in figure.data[1:] for x, y, t in zip(trace.x, trace.y, trace.text or (), strict=False)
+    }
+    assert marks["<b>2</b>"] == ("5", "unknown effect")
