@@ -25,6 +25,7 @@ class SolvePanel:
 
     def __init__(self, gui: viser.GuiApi, bench: Workbench, ask: Callable) -> None:
         self._bench, self._ask = bench, ask
+        self._drawn: Calibration | None = None
         self._shown: tuple | None = None
         self._found: Calibration | None = None
         gui.add_html(

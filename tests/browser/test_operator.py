@@ -1,0 +1,243 @@
+"""The less smooth ways of an operator in a real browser: wrong inputs, pauses, any order, clicks in 3-D, two seats."""
+
+import re
+
+import numpy as np
+import pytest
+from test_dashboard import READY, chromium, group, measure, press, started, tab, visit, wait_for_text  # noqa: F401
+from test_own_cell import alert, choose, folder, text_box
+
+from core.session_store import SUFFIX
+
+PROJECT = """p => { const m = __viserMutable, v = m.camera.position.clone().set(...p);
+  v.applyMatrix4(m.nodeRefFromName['/points'].matrixWorld).project(m.camera);
+  const r = m.canvas.getBoundingClientRect();
+  return [r.left + (v.x + 1) / 2 * r.width, r.top + (1 - v.y) / 2 * r.height] }"""
+
+
+@pytest.fixture
+def dashboard(tmp_path):
+    running = started(tmp_path / f"demo{SUFFIX}")
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def page(chromium, dashboard):  # noqa: F811
+    one = visit(chromium, dashboard)
+    yield one
+    assert one.problems == []
+    one.close()
+
+
+def test_who_and_what_are_kept_checked_and_signed(page, dashboard):
+    text_box(page, "Operator").fill("B. Somebody")
+    page.wait_for_timeout(150)
+    text_box(page, r"Air temperature \[°C\]").fill("warm")
+    page.wait_for_timeout(150)
+    press(page, "Keep these")
+    alert(page, "expected a number from -60 to 100")
+    assert dashboard.bench.state.operator != "B. Somebody"
+    text_box(page, r"Air temperature \[°C\]").fill("22.5")
+    text_box(page, r"Payload \[kg\]").fill("3")
+    page.wait_for_timeout(150)
+    press(page, "Keep these")
+    wait_for_text(page, "cell", "22.5")
+    tab(page, "2 Measure")
+    measure(page, 1)
+    shot = dashboard.bench.state.shots[0]
+    assert (shot.by, shot.taken.payload_kg) == ("B. Somebody", 3.0)
+
+
+def test_a_run_is_paused_gone_on_with_and_stopped(page, dashboard):
+    dashboard.bench.robot._seconds = 0.2
+    tab(page, "2 Measure")
+    group(page, "Run all")
+    wait_for_text(page, "run", "The robot runs the whole plan")
+    group(page, "Undo")
+    alert(page, "The robot is running")
+    page.locator("canvas[data-engine]").click(position={"x": 20, "y": 20})
+    page.keyboard.press("p")
+    wait_for_text(page, "run", "Paused")
+    taken = len(dashboard.bench.state.shots)
+    page.wait_for_timeout(600)
+    assert len(dashboard.bench.state.shots) == taken
+    page.keyboard.press("p")
+    wait_for_text(page, "run", "The robot runs the whole plan")
+    page.keyboard.press("Escape")
+    page.wait_for_function("() => document.querySelector('[data-testid=run]').innerText.trim() === ''")
+    stopped = len(dashboard.bench.state.shots)
+    assert stopped < 129
+    page.wait_for_timeout(600)
+    assert len(dashboard.bench.state.shots) == stopped
+
+
+def test_sweeps_are_made_in_any_order_with_extra_stops_and_skips(page, dashboard):
+    bench = dashboard.bench
+    tab(page, "2 Measure")
+    page.locator("[data-say='sweep-4-1']").click()
+    wait_for_text(page, "step", "Joint 4: stop 1 of 16, target T2")
+    measure(page, 2)
+    assert [shot.taken.target for shot in bench.state.shots] == ["T2", "T1"]
+    group(page, "Skip")
+    wait_for_text(page, "sweeps", "1 skipped")
+    wait_for_text(page, "undo", "the skipping of joint 4, stop 2")
+    folder(page, "Extra stop")
+    choose(page, "Sweep", "joint 4, sweep 1")
+    page.get_by_label("Command [° or mm]", exact=True).filter(visible=True).first.fill("12.5")
+    page.wait_for_timeout(200)
+    press(page, "Measure extra stop")
+    wait_for_text(page, "sweeps", "2 extra")
+    assert np.rad2deg(bench.state.shots[-1].taken.commanded[3]) == pytest.approx(12.5, abs=1e-3)
+    page.get_by_label("Command [° or mm]", exact=True).filter(visible=True).first.fill("300")
+    page.wait_for_timeout(200)
+    press(page, "Measure extra stop")
+    alert(page, "beyond its limits -90 to 90 deg")
+
+
+def test_a_point_is_chosen_by_click_excluded_for_a_reason_and_the_solution_follows(page, dashboard):
+    bench = dashboard.bench
+    tab(page, "2 Measure")
+    group(page, "Run all")
+    wait_for_text(page, "step", "Nothing left to measure")
+    tab(page, "3 Solve")
+    press(page, "Solve")
+    page.wait_for_selector("[data-testid=noise]")
+    before = page.get_by_test_id("noise").inner_text()
+    tab(page, "2 Measure")
+    chosen = click_a_shot(page, dashboard)
+    choose(page, "Reason", "in my own words")
+    text_box(page, "In my words").fill("<b>a bird</b> sat on it")
+    page.wait_for_timeout(200)
+    group(page, "Exclude")
+    wait_for_text(page, "shot", "<b>a bird</b> sat on it")
+    shot = bench.state.shot(chosen)
+    assert (shot.verdict, shot.reason) == ("excluded", "<b>a bird</b> sat on it")
+    tab(page, "3 Solve")
+    wait_for_text(page, "stale", "One shot or decision since the last solution")
+    press(page, "Solve")
+    page.wait_for_function("() => !document.querySelector('[data-testid=stale]')")
+    assert page.get_by_test_id("solution").inner_text().startswith("128 points used")
+    assert page.get_by_test_id("noise").inner_text() == f"{bench.calibration.estimate.noise_m * 1e3:.3f} mm" != before
+    page.locator("summary", has_text="What changed").click()
+    assert "points used: 129 → 128" in page.get_by_test_id("changes").inner_text()
+    tab(page, "2 Measure")
+    group(page, "Undo")
+    wait_for_text(page, "shot", "kept")
+
+
+def click_a_shot(page, dashboard) -> int:
+    """Click shots in 3-D until one is chosen; its id."""
+    bench = dashboard.bench
+    for shot in bench.state.shots[40:100:6]:
+        x, y = page.evaluate(PROJECT, list(shot.taken.point_m))
+        page.mouse.move(x, y)
+        page.wait_for_timeout(300)
+        page.mouse.click(x, y)
+        page.wait_for_timeout(400)
+        if "chosen" in page.get_by_test_id("shot").inner_text():
+            record = int(re.search(r"Record (\d+)", page.get_by_test_id("shot").inner_text())[1])
+            return next(one.id for one in bench.state.shots if one.record == record)
+    raise AssertionError("no shot could be clicked")
+
+
+def test_the_family_of_a_drive_is_chosen_and_limits_are_counted(page, dashboard):
+    bench = dashboard.bench
+    tab(page, "2 Measure")
+    group(page, "Run all")
+    wait_for_text(page, "step", "Nothing left to measure")
+    tab(page, "3 Solve")
+    folder(page, "Families of drives and couplings")
+    choose(page, "Drive of joint 1", "harmonics_2")
+    page.wait_for_timeout(400)
+    press(page, "Solve")
+    page.wait_for_selector("[data-testid=noise]")
+    assert bench.calibration.estimate.transmissions[0].form.name == "harmonics_2"
+    tab(page, "Geometry")
+    page.get_by_label("Limit for lengths [mm]", exact=True).filter(visible=True).fill("1000")
+    page.wait_for_timeout(200)
+    press(page, "Keep limits")
+    wait_for_text(page, "limits", "0 beyond")
+    assert bench.state.settings["limit_length_mm"] == 1000.0
+
+
+def test_the_seat_is_asked_for_refused_given_and_kept_over_a_reload(chromium, dashboard, page):  # noqa: F811
+    watcher = visit(chromium, dashboard)
+    try:
+        press(watcher, "Ask for the operator's seat")
+        press(page, "Keep the seat")
+        alert(watcher, "The operator keeps the seat")
+        wait_for_text(watcher, "seat", "You are watching")
+        page.reload()
+        page.wait_for_function(READY)
+        wait_for_text(page, "seat", "You hold the operator's seat")
+        wait_for_text(watcher, "seat", "You are watching")
+        dashboard.seat._answer_s = 0.5
+        press(watcher, "Ask for the operator's seat")
+        wait_for_text(watcher, "seat", "You hold the operator's seat")
+        wait_for_text(page, "seat", "You are watching")
+        dashboard.seat._away_s = 0.3
+        watcher.close()
+        wait_for_text(page, "seat", "You hold the operator's seat")
+    finally:
+        watcher.close()
+
+
+def test_help_opens_on_a_key_and_terms_explain_themselves(page):
+    page.locator("canvas[data-engine]").click(position={"x": 20, "y": 20})
+    page.keyboard.press("h")
+    dialog = page.get_by_role("dialog")
+    dialog.wait_for()
+    assert "Measure the next shot" in dialog.inner_text()
+    assert "Transmission error" in dialog.inner_text()
+    press(page, "Close")
+    dialog.wait_for(state="detached")
+    tab(page, "2 Measure")
+    assert page.locator("th abbr", has_text="Targets").get_attribute("title").startswith("A point that the instrument")
+
+
+def test_keys_do_what_the_list_says(page, dashboard):
+    bench = dashboard.bench
+    tab(page, "2 Measure")
+    page.locator("canvas[data-engine]").click(position={"x": 20, "y": 20})
+    for key, words in (("Space", "stop 2 of"), ("Enter", "stop 3 of"), ("k", "stop 4 of"), ("Backspace", "stop 3 of")):
+        page.keyboard.press(key)
+        wait_for_text(page, "step", words)
+    page.keyboard.press("y")
+    wait_for_text(page, "step", "stop 4 of")
+    page.keyboard.press("r")
+    page.wait_for_function(
+        "() => document.querySelector('[data-testid=undo]').innerText.includes('second measurement')"
+    )
+    assert sum(shot.counts for shot in bench.state.shots) == 2
+    # While somebody types, keys are letters.
+    tab(page, "1 Cell")
+    text_box(page, "Operator").press_sequentially("sky r", delay=60)
+    page.wait_for_timeout(300)
+    assert len(bench.state.shots) == 3
+    # A key is pressed once, also where a button has the focus.
+    tab(page, "2 Measure")
+    measure(page, 1)
+    page.keyboard.press("Space")
+    wait_for_text(page, "step", "stop 6 of")
+    page.wait_for_timeout(400)
+    assert len(bench.state.shots) == 5
+
+
+@pytest.mark.parametrize(("width", "height"), [(1366, 768), (2560, 1440)])
+@pytest.mark.parametrize("dark", [False, True])
+def test_nothing_is_clipped_in_either_theme(chromium, dashboard, width, height, dark):  # noqa: F811
+    page = visit(chromium, dashboard)
+    page.set_viewport_size({"width": width, "height": height})
+    if dark:
+        tab(page, "View")
+        page.get_by_label("Dark theme", exact=True).filter(visible=True).check()
+        page.wait_for_function("() => document.documentElement.dataset.mantineColorScheme === 'dark'")
+    for name in ("1 Cell", "Check", "2 Measure", "3 Solve", "4 Export", "Help"):
+        tab(page, name)
+        page.wait_for_timeout(200)
+        clipped = page.evaluate("""() => [...document.querySelectorAll('.ta, .ta table')]
+          .filter(e => e.offsetParent && e.scrollWidth > e.clientWidth + 1).map(e => e.dataset.testid || e.tagName)""")
+        assert clipped == [], name
+    assert page.problems == []
+    page.close()
