@@ -153,15 +153,18 @@ def day(robot: Robot, seed: int, plan: Day = Day(), noise_m: float = 0.0) -> Sim
     stops = [stop for j in range(n) for stop in _arc(j, centre, reach, plan.arc)]
     drawn = reach * rng.uniform(-1, 1, (plan.poses, n))
     stops += [(POSE, 0, -1, k, drawn[k]) for _ in range(plan.visits) for k in range(plan.poses)]
-    phase, joint, step, _, _ = (np.array(column, dtype=object) for column in zip(*stops, strict=True))
+    phase, joint, step, pose, _ = (np.array(column, dtype=object) for column in zip(*stops, strict=True))
     m = len(stops) * plan.shots
     stop = np.repeat(np.arange(len(stops)), plan.shots)
     commanded = np.array([place for *_, place in stops])
     sense = np.sign(np.diff(commanded, axis=0, prepend=commanded[:1] - 0.1)).astype(int)
     warm = 1 - np.exp(-np.arange(m) / m)
+    place = np.where(joint > 0, step, pose).astype(int)
+    shot = np.arange(m) % plan.shots
+    moving = (joint[stop] > 0)[:, None]
     rows = table(
         commanded[stop],
-        np.arange(m) % len(targets),
+        (place[stop] + shot) % len(targets),
         phase=phase[stop],
         joint=joint[stop].astype(int),
         sweep=(joint[stop] > 0).astype(int),
@@ -171,8 +174,8 @@ def day(robot: Robot, seed: int, plan: Day = Day(), noise_m: float = 0.0) -> Sim
         time_s=30.0 * np.arange(m),
         temperature_c=21.0 + np.sin(np.arange(m) / 9.0),
         arm_temperature_c=22.0 + 6.0 * warm,
-        payload_kg=np.where(np.arange(m) * 2 < m, 0.0, 4.0),
-        speed=rng.uniform(-0.3, 0.3, (len(stops), n))[stop],
+        payload_kg=4.0 * ((joint + place) % 2)[stop].astype(float),
+        speed=np.where(moving, rng.uniform(-0.3, 0.3, (m, n)), 0.0),
         torque_nm=rng.uniform(-30, 30, (len(stops), n))[stop],
         readback=commanded[stop] + 1e-3 * rng.normal(size=(m, n)),
     )
