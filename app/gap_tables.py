@@ -15,6 +15,7 @@ MOST_OUTLIERS = 60
 MOST_PARAMETERS = 4
 """Of one cause, in a cell."""
 NOWHERE = "–"
+NOT_AT_ALL = "∞"
 SOURCES = {
     "replicates": "repeated measurements",
     "residuals": "what a flexible fit leaves; nothing was repeated",
@@ -162,7 +163,9 @@ def _limit_grid(report: GapReport, limits: list[DetectionLimit]) -> ShownTable:
         (Cell(effect_name(effect)), Cell(unit), *(_size(sizes.get((effect, unit, joint))) for joint in joints))
         for effect, unit in rows
     )
-    return ShownTable("At joints and links", headings, (group,))
+    note = f"{NOT_AT_ALL}: not to be seen at any size, because where base or targets stand absorbs it."
+    absorbed = any(cell.text == NOT_AT_ALL for row in group for cell in row)
+    return ShownTable("At joints and links", headings, (group,), note if absorbed else "")
 
 
 def _limit_list(limits: list[DetectionLimit]) -> ShownTable:
@@ -174,15 +177,21 @@ def _limit_list(limits: list[DetectionLimit]) -> ShownTable:
         Heading("moves points by, mm", "", True),
     )
     group = tuple(
-        (Cell(place_words(one.place)), _size(shown_limit(one)[0]), Cell(shown_limit(one)[1]), _size(one.rms_m * 1e3))
+        (Cell(place_words(one.place)), _size(shown_limit(one)[0]), Cell(shown_limit(one)[1]), _moves(one))
         for one in ranked
     )
     return ShownTable("Elsewhere", headings, (group,))
 
 
+def _moves(limit: DetectionLimit) -> Cell:
+    """What an effect that large does to the points; nothing to be said where no size is large enough."""
+    return _size(limit.rms_m * 1e3 if math.isfinite(shown_limit(limit)[0]) else None)
+
+
 def _size(value: float | None) -> Cell:
     known = value is not None and math.isfinite(value)
-    return Cell(fixed(value, decimals_for(value)) if known else "", numeric=True)
+    words = NOT_AT_ALL if value == math.inf else ""
+    return Cell(fixed(value, decimals_for(value)) if known else words, numeric=True, mark="" if known else "muted")
 
 
 def _rank(effect: str) -> tuple[int, str]:

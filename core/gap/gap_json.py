@@ -154,7 +154,8 @@ def _rivals_record(one: Rivals) -> Json:
 
 def _limit_record(one: DetectionLimit) -> Json:
     size, unit = shown_limit(one)
-    return {**place_record(one.place), "size": number(size), "unit": unit, "rms_mm": mm(one.rms_m)}
+    moved = one.rms_m if np.isfinite(size) else np.nan
+    return {**place_record(one.place), "size": number(size), "unit": unit, "rms_mm": mm(moved)}
 
 
 def _outlier_record(record: int, length_m: float) -> Json:

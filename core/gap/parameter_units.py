@@ -1,5 +1,6 @@
 """Parameters of causes in the units of people, by the SI unit at the end of their names."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,6 +47,8 @@ UNITS = (
 """The first ending that fits counts."""
 PART = Unit("_1", "_ppm", "ppm", 1e6)
 PLAIN = Unit("", "", "", 1.0)
+LARGEST = {"rad": 0.5, "m": 0.5, "1": 0.5}
+"""Sizes, in SI units, that no effect of a working arm exceeds."""
 
 
 @dataclass(frozen=True)
@@ -82,8 +85,10 @@ def unit_of(name: str) -> Unit:
 
 
 def shown_limit(limit: DetectionLimit) -> tuple[float, str]:
-    """The size of a detection limit in a unit of people, and that unit; a plain number in parts in a million."""
-    if limit.unit == "1":
-        return limit.size * PART.scale, PART.symbol
-    unit = unit_of(f"size_{limit.unit}")
-    return limit.size * unit.scale, unit.symbol or limit.unit
+    """The size of a detection limit in a unit of people, and that unit; a plain number in parts in a million.
+
+    Infinite where no size that an arm could have would have been seen: what placement absorbs has no limit.
+    """
+    unit = PART if limit.unit == "1" else unit_of(f"size_{limit.unit}")
+    size = limit.size if limit.size <= LARGEST.get(limit.unit, math.inf) else math.inf
+    return size * unit.scale, unit.symbol or limit.unit

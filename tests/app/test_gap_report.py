@@ -17,7 +17,7 @@ from app.figures.reliability import reliability_figure
 from app.gap_report import gap_html, gap_page
 from app.gap_tables import cause_parameters
 from core.gap.ledger import difference_with, switches
-from core.gap.result import Parameter
+from core.gap.result import DetectionLimit, Parameter, Place
 from core.gap.verdict_words import verdict_sentence
 from core.wording import typeset
 from tests.app.report_cases import HOSTILE
@@ -204,3 +204,10 @@ def test_an_unknown_cause_has_its_mark_on_the_map() -> None:
         t: (x, y) for trace in figure.data[1:] for x, y, t in zip(trace.x, trace.y, trace.text or (), strict=False)
     }
     assert marks["<b>2</b>"] == ("5", "unknown effect")
+
+
+def test_an_effect_that_placement_absorbs_has_no_limit() -> None:
+    limit = DetectionLimit(Place("zero_offset", joint=1), 31.0, "rad", 20.0)
+    shown = words(gap_html(replace(made(), limits=(limit, *made().limits[1:]))))
+    assert "∞: not to be seen at any size" in shown
+    assert "∞" not in words(gap_html(made()))

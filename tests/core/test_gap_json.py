@@ -1,13 +1,14 @@
 """gap.json: every key of the contract, in its units, for every kind of diagnosis."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from core.gap.gap_json import gap_to_json, place_record
 from core.gap.parameter_units import shown_parameter
-from core.gap.result import Parameter, Place
+from core.gap.result import DetectionLimit, Parameter, Place
 from tests.core import gap_reports
 
 KEYS = {
@@ -110,3 +111,12 @@ def test_a_hostile_text_stays_a_text() -> None:
     found = json.loads(gap_to_json(gap_reports.hostile(text)))
     assert found["warnings"] == [text]
     assert found["causes"][0]["target"] == text
+
+
+def test_a_limit_that_no_arm_could_reach_is_no_limit() -> None:
+    report = gap_reports.explained()
+    limits = (DetectionLimit(Place("zero_offset", joint=1), 31.0, "rad", 20.0), report.limits[2])
+    found = json.loads(gap_to_json(replace(report, limits=limits)))["detection_limits"]
+    assert (found[0]["size"], found[0]["unit"], found[0]["rms_mm"]) == (None, "deg", None)
+    assert found[1]["size"] == pytest.approx(np.rad2deg(2e-4))
+    assert found[1]["rms_mm"] == pytest.approx(0.1)
