@@ -1,7 +1,7 @@
 """The way from points to candidates: place, look, learn what the noise is, look again."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from core.geometry import Array
 
 GEOMETRY_PRIORS = (3e-5, 1e-4)
 """How well a calibrated sim's geometry may be known, rad and m; the data choose."""
-AS_CALIBRATED, UNCALIBRATED = 1e-4, 3e-3
+AS_CALIBRATED, UNCALIBRATED = 1e-4, 1e-3
 """Geometry known so well is what a calibration leaves; beyond, it is itself a cause."""
 STRAY, GEOMETRY_CLOSES = 2.5, 0.5
 """The geometry of a whole sim is off where its numbers stray by so many calibrated sizes, rms, and where letting them
@@ -37,7 +37,6 @@ BENT = 0.15
 """Curvature below this share of the noise does not matter."""
 CHANCE, LEAST_EXCESS = 3.5, 0.2
 """Standard deviations, and logarithm of a ratio of variances, beyond which repeats scatter less than residuals."""
-SEARCHED_POINTS = 6000
 
 Progress = Callable[[float, str], None]
 
@@ -62,6 +61,26 @@ class NoiseFound:
     """Indices of points that are left out, (k,)."""
     weight: Array
     """(m,)"""
+
+    def over(self, seen: Observations, left_m: Array) -> "NoiseFound":
+        """The same noise over more points, with what a fit leaves of them, (m, 3)."""
+        stated = seen.stated_covariance_m2
+        used, floor = (float(np.mean(part)) for part in (np.trace(self.covariance_m2, axis1=1, axis2=2), self.floor_m2))
+        before = float(np.trace(stated, axis1=1, axis2=2).mean())
+        covariance = _rescaled(stated, used / before)
+        scaled = whitening(covariance, np.ones(seen.count)).rows(left_m)
+        weight = _fitted(seen).astype(float)
+        outlying = np.flatnonzero((weight > 0) & (np.abs(scaled).max(axis=1) > noise_found.OUTLYING))
+        weight[outlying] = 0.0
+        inlying = weight > 0
+        weight[inlying] *= noise_found.student_weights(scaled[inlying], self.tails)
+        floors = np.trace(_rescaled(stated, floor / before), axis1=1, axis2=2)
+        return replace(self, covariance_m2=covariance, floor_m2=floors, outliers=outlying, weight=weight)
+
+
+def _fitted(seen: Observations) -> np.ndarray:
+    """Points that may be fitted, (m,): all but the owner's validation rows, unless there is nothing else."""
+    return ~seen.check if (~seen.check).any() else np.ones(seen.count, dtype=bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +119,7 @@ def analyse(
         without: effects that the library shall not know.
         told: which named candidates are looked at; None: all.
     """
-    fitted = ~seen.check if (~seen.check).any() else np.ones(seen.count, dtype=bool)
-    base_weight = fitted.astype(float)
+    base_weight = _fitted(seen).astype(float)
     progress(0.02, "placing base and targets")
     covariance = seen.stated_covariance_m2
     sim = placed = place(seen, base_weight / np.trace(covariance, axis1=1, axis2=2))
@@ -223,8 +241,7 @@ def _with_geometry(problem: Problem) -> tuple[Evidence, float, float, Found, Cho
         k for k in problem.named if problem.candidates[k].place.effect == "geometry" or _zero_of_joint(problem, k)
     ]
     for k in members:
-        gain = evidence.gains(np.array([k]), given)
-        given = given.plus(int(k), float(max(gain.size[0], 1.0)))
+        given = given.plus(int(k), UNCALIBRATED / float(problem.design.scale[problem.slices[k].start]))
     found = search(evidence, problem.named, problem.cost, threshold, given)
     return evidence, AS_CALIBRATED, threshold, found, given
 

@@ -17,10 +17,11 @@ from core.gap.effects.candidate import Candidate
 from core.gap.evidence import Chosen, joined
 from core.gap.folds import blocks
 from core.gap.kept_out import KeptOut, mean_square
-from core.gap.observations import observe
+from core.gap.observations import Observations, observe
 from core.gap.open_set import Judge, Stand, stands
 from core.gap.placement import placement_slots
 from core.gap.posterior import rivals, twins
+from core.gap.problem import Problem
 from core.gap.result import (
     UNKNOWN,
     Cause,
@@ -37,9 +38,14 @@ from core.gap.scatter import scattering_joint
 from core.gap.transfer import transfers
 from core.gap.warnings_of import warnings_of
 from core.gap.where import where
+from core.gap.widened import Wide, thinned, widened
 from core.geometry import Array
 from core.measurements import Campaign
 
+UNKNOWN_PROBABILITY = 0.8
+"""That something without a name acts at that joint or variable."""
+TOLD_SHARE = 0.01
+"""Of the gap: a change of geometry that closes less is fitted but not told."""
 HOLD_OUT = "fifths of each arc and regions of the joint space, each predicted from the others"
 SURE_OF_REST = 0.1
 """What nameless functions must still close, as a share of the gap, to be told as something unknown."""
@@ -74,9 +80,10 @@ def diagnose(
     start = time.perf_counter()
     seen = observe(campaign, arm)
     only = None if told is None else _only(told)
-    analysis = analyse(seen, frozenset(without), only, progress or quiet)
+    some = thinned(seen)
+    analysis = analyse(some, frozenset(without), only, progress or quiet)
     (progress or quiet)(0.85, "judging causes on kept-out points")
-    found = Findings(analysis, blocks(seen), told is not None)
+    found = Findings(analysis, seen, blocks(some), told is not None)
     report = _report(campaign, arm, found)
     (progress or quiet)(1.0, "done")
     return replace(
@@ -106,7 +113,10 @@ class Findings:
     """What stands, and how well it predicts points that no fit has seen."""
 
     analysis: Analysis
+    seen: Observations
+    """All points; the analysis may have searched some of them."""
     fold: np.ndarray
+    """Of the searched points."""
     told: bool
 
     @cached_property
@@ -125,6 +135,7 @@ class Findings:
         judged = self._told_stands() if self.told else [*self._geometry_stands(), *stands(self.judge)]
         named = [one for one in judged if not one.unknown]
         order = sorted(named, key=lambda one: self.judge.square(_chosen([one])))
+        order = [one for one in order if self.told or self._matters(one, order)]
         if self.told:
             return order
         return [*order, *self._unknown([one for one in judged if one.unknown], order)]
@@ -132,6 +143,14 @@ class Findings:
     @cached_property
     def named(self) -> list[Stand]:
         return [one for one in self.stands if not one.unknown]
+
+    def _matters(self, stand: Stand, others: list[Stand]) -> bool:
+        """Whether geometry that is fitted anyway is worth telling of."""
+        if stand.groups[0] not in self.analysis.given.groups:
+            return True
+        rest = _chosen([one for one in others if one is not stand])
+        kept, closable = self.judge.kept_out, self.judge.closable_m2
+        return kept.square_m2(rest) - kept.square_m2(joined(rest, _chosen([stand]))) > TOLD_SHARE * closable
 
     def _told_stands(self) -> list[Stand]:
         everything = self.analysis.everything
@@ -165,20 +184,35 @@ class Findings:
     @cached_property
     def chosen(self) -> Chosen:
         """All named causes."""
-        return _chosen(self.named)
+        return joined(_chosen(self.named), self.analysis.given)
+
+    @cached_property
+    def wide(self) -> Wide:
+        """All points with every candidate that stands or describes what does not."""
+        groups = joined(self.chosen, _chosen(self.stands)).groups
+        return widened(self.analysis, self.seen, groups, self.chosen)
+
+    @cached_property
+    def all_folds(self) -> np.ndarray:
+        return self.fold if self.seen is self.analysis.sim.seen else blocks(self.seen)
 
     @cached_property
     def kept(self) -> KeptOut:
         """Models of causes with the small changes of geometry as they are: what each cause closes."""
-        everything = joined(self.analysis.given, self.chosen, _chosen(self.stands), self.judge.rest, self.judge.lone)
-        return KeptOut(
-            self.analysis.problem, self.fold, self.analysis.geometry_prior, everything.groups, self.judge.geometry
-        )
+        return self._kept(_chosen(self.stands), self.judge.geometry)
 
     @cached_property
     def honest(self) -> KeptOut:
         """All named causes, with geometry found anew by every fit: how good the corrected sim is."""
-        return KeptOut(self.analysis.problem, self.fold, self.analysis.geometry_prior, self.chosen.groups)
+        return self._kept(self.chosen, None)
+
+    def _kept(self, chosen: Chosen, geometry: Array | None) -> KeptOut:
+        groups = self.wide.chosen(joined(self.chosen, chosen)).groups
+        return KeptOut(self.wide.problem, self.all_folds, self.analysis.geometry_prior, groups, geometry)
+
+    def square_m2(self, chosen: Chosen) -> float:
+        """Mean square of what causes leave of kept-out points, m^2."""
+        return self.kept.square_m2(self.wide.chosen(chosen))
 
     @cached_property
     def gap_m2(self) -> float:
@@ -188,30 +222,31 @@ class Findings:
     @cached_property
     def left_m2(self) -> float:
         """With all named causes."""
-        return self.honest.square_m2(self.chosen)
+        return self.honest.square_m2(self.wide.chosen(self.chosen))
 
     @cached_property
     def left_m(self) -> Array:
         """Residuals after all named causes, fitted on all points, (m, 3)."""
-        index, numbers, _ = self.honest.fitted(self.chosen)
-        return self.analysis.problem.residual_m - self.honest.plain[:, :, index] @ numbers
+        index, numbers, _ = self.honest.fitted(self.wide.chosen(self.chosen))
+        return self.wide.problem.residual_m - self.honest.plain[:, :, index] @ numbers
 
     def _placed_left(self) -> Array:
         """Residuals with base and targets alone, about their own placement, each fold from the others, (m, 3)."""
-        a = self.analysis
-        slots = placement_slots(a.placed.seen)
+        placed, noise = replace(self.analysis.placed, seen=self.seen), self.wide.noise
+        slots = placement_slots(self.seen)
+        residual_m = self.wide.residual_m
         if not slots:
-            return a.residual_m
-        fields, weight = a.placed.fields(slots), a.noise.weight / a.noise.floor_m2
+            return residual_m
+        fields, weight = placed.fields(slots), noise.weight / noise.floor_m2
         square = np.einsum("mck,m,mcl->mkl", fields, weight, fields, optimize=True)
-        pull = np.einsum("mck,m,mc->mk", fields, weight, a.residual_m, optimize=True)
-        out = np.empty_like(a.residual_m)
-        for f in np.unique(self.fold):
-            fit = (self.fold != f) & (a.noise.weight > 0)
+        pull = np.einsum("mck,m,mc->mk", fields, weight, residual_m, optimize=True)
+        out = np.empty_like(residual_m)
+        for f in np.unique(self.all_folds):
+            fit = (self.all_folds != f) & (noise.weight > 0)
             whole = square[fit].sum(axis=0)
             whole += 1e-9 * np.trace(whole) / len(whole) * np.eye(len(whole))
-            mine = self.fold == f
-            out[mine] = a.residual_m[mine] - fields[mine] @ np.linalg.solve(whole, pull[fit].sum(axis=0))
+            mine = self.all_folds == f
+            out[mine] = residual_m[mine] - fields[mine] @ np.linalg.solve(whole, pull[fit].sum(axis=0))
         return out
 
     @cached_property
@@ -248,25 +283,26 @@ def _report(campaign: Campaign, arm: CalibratedArm | None, found: Findings) -> D
     a = found.analysis
     causes = _causes(found)
     gap = found.verdict is not Verdict.NO_GAP
-    noise = a.noise
+    wide, noise = found.wide, found.wide.noise
+    placed = replace(a.placed, seen=found.seen)
     return Diagnosis(
         campaign=campaign,
         sim=a.sim.seen.sim,
-        rows=a.sim.seen.rows,
-        difference_m=a.residual_m,
+        rows=found.seen.rows,
+        difference_m=wide.residual_m,
         left_m=found.left_m,
         verdict=found.verdict,
         gap_rms_m=float(np.sqrt(found.gap_m2)),
         left_rms_m=float(np.sqrt(found.left_m2)),
         noise=_noise_model(campaign, found),
         causes=causes,
-        where=where(a.placed, a.residual_m, a.problem, a.evidence, gap),
-        transfers=transfers(a.problem, a.geometry_prior, Chosen(), found.chosen),
+        where=where(placed, wide.residual_m, a.problem, a.evidence, gap),
+        transfers=transfers(wide.problem, a.geometry_prior, wide.chosen(found.chosen)),
         left_test=found.left_test,
         limits=detection_limits(a.problem, a.evidence, a.threshold),
         rivals=_rivals(found, causes),
         outliers=tuple(
-            Outlier(int(a.sim.seen.record[k]), float(np.linalg.norm(found.left_m[k]))) for k in noise.outliers
+            Outlier(int(found.seen.record[k]), float(np.linalg.norm(found.left_m[k]))) for k in noise.outliers
         ),
         warnings=warnings_of(a.doings, noise),
         evidence_map=_evidence_map(found) if gap else (),
@@ -295,16 +331,15 @@ def _noise_model(campaign: Campaign, found: Findings) -> NoiseModel:
 
 def _causes(found: Findings) -> tuple[Cause, ...]:
     """Every cause with what it closes: alone, in its turn, and last."""
-    kept = found.kept
     total = max(found.gap_m2 - found.floor_m2, 1e-3 * found.floor_m2)
-    base = kept.square_m2(Chosen())
+    base = found.square_m2(Chosen())
     so_far, before, out = Chosen(), base, []
     for stand in found.stands:
         own = _chosen([stand])
         others = _chosen([one for one in found.named if one is not stand])
         so_far = joined(so_far, own)
-        after = kept.square_m2(so_far)
-        last = kept.square_m2(others) - kept.square_m2(joined(others, own))
+        after = found.square_m2(so_far)
+        last = found.square_m2(others) - found.square_m2(joined(others, own))
         probability, alike = _probability(found, stand, others)
         out.append(
             Cause(
@@ -314,7 +349,7 @@ def _causes(found: Findings) -> tuple[Cause, ...]:
                 parameters=_parameters(found, stand),
                 gap_before_rms_m=float(np.sqrt(before)),
                 gap_after_rms_m=float(np.sqrt(after)),
-                share_closed=float((base - kept.square_m2(own)) / total),
+                share_closed=float((base - found.square_m2(own)) / total),
                 share_closed_last=float(last / total),
                 shift_m=_shift(found, stand),
             )
@@ -331,18 +366,15 @@ def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, 
     return twins(stand, rivals(found.judge, stand, others))
 
 
-UNKNOWN_PROBABILITY = 0.8
-"""That something without a name acts at that joint or variable."""
-
-
 def _parameters(found: Findings, stand: Stand) -> tuple[Parameter, ...]:
     if stand.unknown:
         return ()
-    problem = found.analysis.problem
-    _, numbers, covariance = found.honest.fitted(found.chosen)
-    at = _position(found, found.chosen, stand.groups[0])
-    candidate = problem.candidates[stand.groups[0]]
-    scale = problem.design.scale[problem.slices[stand.groups[0]]]
+    problem, chosen = found.wide.problem, found.wide.chosen(found.chosen)
+    first = found.wide.number[stand.groups[0]]
+    _, numbers, covariance = found.honest.fitted(chosen)
+    at = _position(problem, chosen, first)
+    candidate = problem.candidates[first]
+    scale = problem.design.scale[problem.slices[first]]
     own = slice(at, at + len(scale))
     stds = np.sqrt(np.diag(covariance)[own]) * scale
     values = numbers[own] * scale
@@ -350,9 +382,8 @@ def _parameters(found: Findings, stand: Stand) -> tuple[Parameter, ...]:
     return (*fitted, *(Parameter(name, value, float("nan")) for name, value in candidate.fixed))
 
 
-def _position(found: Findings, chosen: Chosen, group: int) -> int:
+def _position(problem: Problem, chosen: Chosen, group: int) -> int:
     """Where a chosen candidate's columns begin among those of a fit."""
-    problem = found.analysis.problem
     at = problem.nuisance
     for g in chosen.groups:
         if g == group:
@@ -363,13 +394,13 @@ def _position(found: Findings, chosen: Chosen, group: int) -> int:
 
 def _shift(found: Findings, stand: Stand) -> Array:
     """What one cause moves when all are fitted together, (m, 3)."""
-    chosen = joined(found.chosen, _chosen([stand]))
+    problem = found.wide.problem
+    chosen = found.wide.chosen(joined(found.chosen, _chosen([stand])))
     index, numbers, _ = found.kept.fitted(chosen)
-    out = np.zeros_like(found.analysis.problem.residual_m)
-    for g in stand.groups:
-        at = _position(found, chosen, g)
-        width = found.analysis.problem.slices[g].stop - found.analysis.problem.slices[g].start
-        own = slice(at, at + width)
+    out = np.zeros_like(problem.residual_m)
+    for g in found.wide.chosen(_chosen([stand])).groups:
+        at = _position(problem, chosen, g)
+        own = slice(at, at + problem.slices[g].stop - problem.slices[g].start)
         out += found.kept.plain[:, :, index[own]] @ numbers[own]
     return out
 
@@ -395,27 +426,21 @@ def _evidence_map(found: Findings) -> tuple[Cell, ...]:
 def _best_closure(found: Findings) -> float:
     if not found.named:
         return 0.0
-    base = found.kept.square_m2(Chosen())
+    base = found.square_m2(Chosen())
     total = max(found.gap_m2 - found.floor_m2, 1e-300)
-    return float((base - found.kept.square_m2(_chosen(found.named[:1]))) / total)
+    return float((base - found.square_m2(_chosen(found.named[:1]))) / total)
 
 
 def _corrected(arm: CalibratedArm | None, found: Findings) -> CorrectedSim:
-    a = found.analysis
-    problem = a.problem
-    _, numbers, _ = found.honest.fitted(found.chosen)
-    scaled = numbers * np.concatenate(
-        [
-            problem.design.scale[: problem.nuisance],
-            *(problem.design.scale[problem.slices[g]] for g in found.chosen.groups),
-        ]
-    )
+    problem, chosen = found.wide.problem, found.wide.chosen(found.chosen)
+    _, numbers, _ = found.honest.fitted(chosen)
+    own = [problem.design.scale[problem.slices[g]] for g in chosen.groups]
+    scaled = numbers * np.concatenate([problem.design.scale[: problem.nuisance], *own])
     slots = [column[0][0] for column in problem.design.columns[: problem.nuisance]]
     geometry = tuple((slots[k], float(scaled[k])) for k in range(problem.placement, problem.nuisance))
-    at, causes, values = problem.nuisance, [], []
-    for g in found.chosen.groups:
-        width = problem.slices[g].stop - problem.slices[g].start
-        causes.append(problem.candidates[g])
-        values.append(scaled[at : at + width])
-        at += width
-    return CorrectedSim(arm, tuple(causes), tuple(values), geometry, a.sim.seen.campaign.digest)
+    at, values = problem.nuisance, []
+    for part in own:
+        values.append(scaled[at : at + len(part)])
+        at += len(part)
+    causes = tuple(problem.candidates[g] for g in chosen.groups)
+    return CorrectedSim(arm, causes, tuple(values), geometry, found.seen.campaign.digest)

@@ -34,6 +34,9 @@ class Chosen:
         return Chosen(self.groups[:k] + self.groups[k + 1 :], self.sizes[:k] + self.sizes[k + 1 :])
 
 
+NOTHING = Chosen()
+
+
 def joined(*parts: Chosen) -> Chosen:
     """All of several choices, each candidate once."""
     groups: dict[int, float] = {}
@@ -121,7 +124,7 @@ class Evidence:
         hyper = sum(0.5 * np.log10(size) ** 2 for size in chosen.sizes)
         return float(0.5 * (explained - occam) - hyper)
 
-    def gains(self, groups: np.ndarray, chosen: Chosen = Chosen()) -> Gains:
+    def gains(self, groups: np.ndarray, chosen: Chosen = NOTHING) -> Gains:
         """What each group would add to what is chosen."""
         evidence, size = np.empty(len(groups)), np.empty(len(groups))
         for places, squares, pulls in self._conditioned(groups, chosen):

@@ -118,9 +118,7 @@ def _block(
     campaign = seen.campaign
     table = campaign.measurements
     m, count = table.count, len(rows)
-    changes: dict[str, object] = {
-        one.name: _appended(getattr(table, one.name), rows) for one in fields(Measurements)
-    }
+    changes: dict[str, object] = {one.name: _appended(getattr(table, one.name), rows) for one in fields(Measurements)}
     changes["record"] = np.concatenate([table.record, table.record.max() + 1 + np.arange(count)])
     changes["approach"][m:] *= sense
     if table.time_s is not None:
@@ -156,4 +154,6 @@ def observe_block(seen: Observations, block: Block) -> Observations:
     rows = np.arange(table.count - block.count, table.count)
     commanded = table.commanded[rows]
     active = active_commands(block.campaign.robot, commanded)
-    return Observations(block.campaign, seen.chain, rows, active, nominal_net(block.campaign.robot, commanded), seen.sim)
+    return Observations(
+        block.campaign, seen.chain, rows, active, nominal_net(block.campaign.robot, commanded), seen.sim
+    )

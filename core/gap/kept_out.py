@@ -11,7 +11,6 @@ from core.gap.folds import CHECK, placeable
 from core.gap.problem import Problem
 from core.geometry import Array
 
-
 KNOWN = 1e-9
 """Prior of geometry that is taken as known, rad and m."""
 

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from core.gap.evidence import Chosen, Evidence, joined
+from core.gap.evidence import NOTHING, Chosen, Evidence, joined
 from core.gap.kept_out import KeptOut
 from core.gap.problem import Problem
 from core.gap.result import Place
@@ -57,7 +57,7 @@ class Judge:
     threshold: float
     floor_m2: float
     found: Chosen
-    given: Chosen = Chosen()
+    given: Chosen = NOTHING
     """Geometry that needs no judgement: it is there whatever else is."""
 
     @property

@@ -33,9 +33,10 @@ def place(seen: Observations, weights: Array) -> Sim:
     starts = sorted(
         (_linear_rest(seen.part(some), weights[some], turn) for turn in _directions()), key=lambda found: found[0]
     )
-    refined = [_refined(sim.part(fitted), weights[fitted]) for _, sim in _over(seen, starts[:REFINED])]
-    best = min(refined, key=lambda sim: _misfit(sim, weights[fitted]))
-    return replace(best, seen=seen)
+    refined = [_refined(sim, weights[some]) for _, sim in starts[:REFINED]]
+    best = min(refined, key=lambda sim: _misfit(sim, weights[some]))
+    whole = replace(best, seen=seen, middle_m=seen.point_m.mean(axis=0))
+    return replace(_refined(whole.part(fitted), weights[fitted]), seen=seen)
 
 
 def placement_slots(seen: Observations) -> list[Slot]:
@@ -64,7 +65,7 @@ def _unknown_targets(seen: Observations) -> list[int]:
 
 
 def _directions() -> list[Array]:
-    return list(Rotation.random(STARTS, random_state=7).as_matrix()) + [np.eye(3)]
+    return [*Rotation.random(STARTS, random_state=7).as_matrix(), np.eye(3)]
 
 
 def _known_places(seen: Observations) -> Array:
@@ -91,10 +92,6 @@ def _linear_rest(seen: Observations, weights: Array, turn: Array) -> tuple[float
         places[t] = found[3 + 3 * k : 6 + 3 * k]
     misfit = float(np.sum(((rest - columns @ found) * root) ** 2))
     return misfit, Sim(seen, transform(turn, found[:3]), places, seen.point_m.mean(axis=0))
-
-
-def _over(seen: Observations, starts: list[tuple[float, Sim]]) -> list[tuple[float, Sim]]:
-    return [(misfit, replace(sim, seen=seen, middle_m=seen.point_m.mean(axis=0))) for misfit, sim in starts]
 
 
 def _misfit(sim: Sim, weights: Array) -> float:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.gap.evidence import Chosen, Evidence, Gains, joined
+from core.gap.evidence import NOTHING, Chosen, Evidence, Gains, joined
 from core.geometry import Array
 
 MOST_CAUSES = 6
@@ -27,7 +27,7 @@ def search(
     among: np.ndarray,
     cost: Array,
     threshold: float,
-    given: Chosen = Chosen(),
+    given: Chosen = NOTHING,
     most: int = MOST_CAUSES,
 ) -> Found:
     """Forward choice with exchange.

@@ -12,19 +12,14 @@ FEWEST = 12
 """Points on either side."""
 
 
-def transfers(problem: Problem, geometry_prior: float, bare: Chosen, chosen: Chosen) -> tuple[Transfer, ...]:
-    """All splits that the data allow.
-
-    Args:
-        bare: what is fitted before the causes: geometry that is given.
-        chosen: that and the causes.
-    """
+def transfers(problem: Problem, geometry_prior: float, chosen: Chosen) -> tuple[Transfer, ...]:
+    """All splits that the data allow: base and targets placed alone, and with all causes."""
     out = []
     for fitted_on, predicted, is_fitted in _splits(problem):
         fold = np.where(is_fitted, 0, CHECK)
         if min(np.count_nonzero(is_fitted), np.count_nonzero(~is_fitted)) >= FEWEST:
-            out.append(_transfer(problem, geometry_prior, bare, chosen, fold, fold == CHECK, fitted_on, predicted))
-    out += _rotated(problem, geometry_prior, bare, chosen)
+            out.append(_transfer(problem, geometry_prior, chosen, fold, fold == CHECK, fitted_on, predicted))
+    out += _rotated(problem, geometry_prior, chosen)
     return tuple(out)
 
 
@@ -44,13 +39,13 @@ def _splits(problem: Problem) -> list[tuple[str, str, np.ndarray]]:
     return out
 
 
-def _rotated(problem: Problem, prior: float, bare: Chosen, chosen: Chosen) -> list[Transfer]:
+def _rotated(problem: Problem, prior: float, chosen: Chosen) -> list[Transfer]:
     """Each fifth of the time, and each region of the joint space, predicted from the others."""
     seen = problem.sim.seen
     region = regions(seen.active, seen.span, FOLDS) % FOLDS
     every = np.ones(seen.count, dtype=bool)
     return [
-        _transfer(problem, prior, bare, chosen, fold, every, f"all other {what}s", f"each {what} in turn")
+        _transfer(problem, prior, chosen, fold, every, "all others", f"each {what} in turn")
         for fold, what in (
             (times(seen), "fifth of the time"),
             (np.where(seen.check, CHECK, region), "region of the joints"),
@@ -62,14 +57,14 @@ def _rotated(problem: Problem, prior: float, bare: Chosen, chosen: Chosen) -> li
 def _transfer(
     problem: Problem,
     prior: float,
-    bare: Chosen,
     chosen: Chosen,
     fold: np.ndarray,
     judged: np.ndarray,
     fitted_on: str,
     predicted: str,
 ) -> Transfer:
-    kept = KeptOut(problem, fold, prior, chosen.groups)
-    judged = judged & kept.judged
-    before, after = (mean_square(kept.left_m(one)[judged]) for one in (bare, chosen))
+    as_drawn = KeptOut(problem, fold, prior, (), np.zeros(problem.geometry))
+    corrected = KeptOut(problem, fold, prior, chosen.groups)
+    judged = judged & corrected.judged
+    before, after = mean_square(as_drawn.left_m(Chosen())[judged]), mean_square(corrected.left_m(chosen)[judged])
     return Transfer(fitted_on, predicted, int(np.count_nonzero(judged)), float(np.sqrt(before)), float(np.sqrt(after)))

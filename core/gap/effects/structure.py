@@ -105,7 +105,8 @@ def _thermal(links: list[int], everywhere: bool, law_name: str, law, laws: int) 
         rise = law(doings)
         steps = doings.seen.chain.link_transforms[:, :3, 3]
         one = [[(Slot(Part.LINK, i, 3 + c), rise * steps[i, c]) for c in range(3) if steps[i, c]] for i in links]
-        return [sum(one, []), *one] if everywhere and len(links) > 1 else one
+        together = [term for column in one for term in column]
+        return [together, *one] if everywhere and len(links) > 1 else one
 
     per = "per_k" if law_name.startswith("with") else "when_warm_1"
     names = tuple(f"growth_of_link_{i + 1}_{per}" for i in links)
