@@ -101,7 +101,7 @@ def shown_noise(report: GapReport) -> ShownTable:
 
 def shown_limits(report: GapReport) -> tuple[ShownTable, ...]:
     """Effects against joints, and those that sit elsewhere."""
-    at_joints = [one for one in report.limits if one.place.joint is not None and one.place.source is None]
+    at_joints = [one for one in report.limits if one.place.joint is not None]
     elsewhere = [one for one in report.limits if one not in at_joints]
     tables = [_limit_grid(report, at_joints)] if at_joints else []
     return (*tables, _limit_list(elsewhere)) if elsewhere else tuple(tables)
@@ -138,7 +138,7 @@ def _cause_row(number_: int, cause: Cause) -> list[Cell]:
         count(number_),
         Cell(place_words(cause.place)),
         Cell(percent(cause.probability), numeric=True),
-        Cell(either_of(others) or NOWHERE, mark="significant" if others else "muted"),
+        Cell(either_of(others) or NOWHERE, mark="" if others else "muted"),
         Cell(cause_parameters(cause) or NOWHERE),
         number(cause.gap_before_rms_m * 1e3),
         number(cause.gap_after_rms_m * 1e3),
@@ -155,13 +155,17 @@ def _holds(before: float, after: float) -> Cell:
 
 
 def _limit_grid(report: GapReport, limits: list[DetectionLimit]) -> ShownTable:
+    """One row for each effect and unit, and for each joint that may drag others along."""
     joints = range(1, report.campaign.robot.joint_count + 1)
-    rows = sorted({(one.place.effect, shown_limit(one)[1]) for one in limits}, key=lambda row: _rank(row[0]))
-    sizes = {(one.place.effect, shown_limit(one)[1], one.place.joint): shown_limit(one)[0] for one in limits}
+    sizes: dict[tuple, dict[int | None, float]] = {}
+    for one in limits:
+        size, unit = shown_limit(one)
+        sizes.setdefault((_rank(one.place.effect), one.place.source or 0, unit), {})[one.place.joint] = size
     headings = (Heading("effect"), Heading("unit"), *(Heading(f"joint {joint}", numeric=True) for joint in joints))
     group = tuple(
-        (Cell(effect_name(effect)), Cell(unit), *(_size(sizes.get((effect, unit, joint))) for joint in joints))
-        for effect, unit in rows
+        (Cell(_drags(effect, source)), Cell(unit), *(_size(sizes[row].get(joint)) for joint in joints))
+        for row in sorted(sizes)
+        for (_, effect), source, unit in [row]
     )
     note = f"{NOT_AT_ALL}: not to be seen at any size, because where base or targets stand absorbs it."
     absorbed = any(cell.text == NOT_AT_ALL for row in group for cell in row)
@@ -181,6 +185,10 @@ def _limit_list(limits: list[DetectionLimit]) -> ShownTable:
         for one in ranked
     )
     return ShownTable("Elsewhere", headings, (group,))
+
+
+def _drags(effect: str, source: int) -> str:
+    return f"{effect_name(effect)} from joint {source}, to" if source else effect_name(effect)
 
 
 def _moves(limit: DetectionLimit) -> Cell:

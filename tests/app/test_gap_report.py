@@ -15,7 +15,7 @@ from app.figures.gap_vectors import gap_vectors_figure, magnification
 from app.figures.gap_where import gap_records_figure, gap_shares_figure
 from app.figures.reliability import reliability_figure
 from app.gap_report import gap_html, gap_page
-from app.gap_tables import cause_parameters
+from app.gap_tables import cause_parameters, shown_limits
 from core.gap.ledger import difference_with, switches
 from core.gap.result import DetectionLimit, Parameter, Place
 from core.gap.verdict_words import verdict_sentence
@@ -211,3 +211,11 @@ def test_an_effect_that_placement_absorbs_has_no_limit() -> None:
     shown = words(gap_html(replace(made(), limits=(limit, *made().limits[1:]))))
     assert "∞: not to be seen at any size" in shown
     assert "∞" not in words(gap_html(made()))
+
+
+def test_limits_of_couplings_stand_under_the_joint_that_follows() -> None:
+    limits = tuple(DetectionLimit(Place("coupling", joint=k, source=2), k * 1e-3, "1", 1e-4) for k in (1, 3, 4))
+    (table,) = shown_limits(replace(made(), limits=limits))
+    assert [cell.text for cell in table.groups[0][0]] == [
+        *("coupling from joint 2, to", "ppm", "1000", "", "3000", "4000", "", ""),
+    ]
