@@ -1,0 +1,180 @@
+"""Reviewing a solution in a real browser: what is clicked is shown where it is, and points are excluded by a click."""
+
+import time
+
+import numpy as np
+import pytest
+
+from app.dashboard import Dashboard
+from app.scene.cameras import UP, Camera, fly_to
+from app.scene.colours import HIGHLIGHT
+from app.spots import spot_of
+from app.workbench import Workbench
+from core.session import Session
+from core.session_store import SUFFIX
+from core.twin import irb_l6
+from core.twin.demo import demo_events
+from tests.browser.test_dashboard import chromium, group, press, tab, visit, wait_for_text  # noqa: F401
+
+MIDDLE = """() => { const r = __viserMutable.canvas.getBoundingClientRect();
+  return [r.left + r.width / 2, r.top + r.height / 2] }"""
+POINTS = """() => { let n = 0; __viserMutable.nodeRefFromName['/points/kept']?.traverse(o => {
+  n = Math.max(n, o.instancesCount ?? 0) }); return n }"""
+PLOT = "() => [...document.querySelectorAll('.js-plotly-plot')].find(p => p.offsetParent)?.layout.title.text ?? ''"
+ARM = "() => JSON.stringify(__viserMutable.nodeRefFromName['/arm/link6'].matrixWorld.elements)"
+
+
+@pytest.fixture(scope="module")
+def dashboard(tmp_path_factory):
+    cell = irb_l6.cell()
+    path = tmp_path_factory.mktemp("review") / f"demo{SUFFIX}"
+    running = Dashboard(Workbench(Session.create(path, demo_events(cell), by="A. Operator"), cell))
+    running.bench.run(True)
+    running.bench.solve()
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def page(chromium, dashboard):  # noqa: F811
+    one = visit(chromium, dashboard)
+    yield one
+    assert one.problems == []
+    one.close()
+
+
+def until(condition, seconds: float = 15.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.05)
+
+
+def client_of(dashboard: Dashboard):
+    return max(dashboard.server.get_clients().items())[1]
+
+
+def stands_at(client, camera: Camera) -> bool:
+    return bool(np.allclose(client.camera.position, camera.position_m, atol=1e-3))
+
+
+def colour_of(dashboard: Dashboard, node: str) -> tuple[int, ...]:
+    return tuple(dashboard.server.scene.get_handle_by_name(node).color)
+
+
+def choose(page, option: str) -> None:
+    page.get_by_label("Show", exact=True).filter(visible=True).click()
+    page.get_by_role("option", name=option).click()
+
+
+def test_a_row_of_table_2_is_flown_to_and_lit(page, dashboard):
+    tab(page, "Geometry")
+    page.locator("[data-say='2-a_m']").click()
+    until(lambda: dashboard.cell._diagnosis is not None)
+    until(lambda: stands_at(client_of(dashboard), dashboard.cell._diagnosis.camera(2, "a_m")))
+    assert colour_of(dashboard, "/diagnosis/dimensions/2_a_m") == HIGHLIGHT
+    assert colour_of(dashboard, "/diagnosis/dimensions/2_b_m") != HIGHLIGHT
+    page.locator("[data-say='2-b_m']").focus()
+    page.keyboard.press("Enter")
+    until(lambda: colour_of(dashboard, "/diagnosis/dimensions/2_b_m") == HIGHLIGHT)
+
+
+def test_a_finding_about_a_drive_shows_its_axis(page, dashboard):
+    tab(page, "3 Solve")
+    finding = next(f for f in dashboard.bench.calibration.findings if f.joint == 5)
+    page.locator(f"[data-say='{spot_of(finding).word}']").first.click()
+    until(lambda: colour_of(dashboard, "/axes/5/arrow") == HIGHLIGHT)
+    camera = next(c for c in dashboard.cell.cameras() if c.name == "Joint 5")
+    until(lambda: stands_at(client_of(dashboard), camera))
+    assert not dashboard.cell._diagnosis or not dashboard.cell._diagnosis.visible
+
+
+def test_who_watches_flies_but_changes_nothing_for_others(chromium, page, dashboard):  # noqa: F811
+    dashboard.view.light(spot_of(next(f for f in dashboard.bench.calibration.findings if f.joint == 2)))
+    watcher = visit(chromium, dashboard)
+    try:
+        wait_for_text(watcher, "seat", "You are watching")
+        mine = client_of(dashboard)
+        tab(watcher, "3 Solve")
+        watcher.locator("[data-testid=findings] [data-say='5']").first.click()
+        until(lambda: stands_at(mine, next(c for c in dashboard.cell.cameras() if c.name == "Joint 5")))
+        assert colour_of(dashboard, "/axes/2/arrow") == HIGHLIGHT
+        assert colour_of(dashboard, "/axes/5/arrow") != HIGHLIGHT
+        tab(watcher, "View")
+        watcher.get_by_label("Nominal arm as a ghost", exact=True).click()
+        watcher.get_by_role("alert").filter(has_text="Another browser holds").wait_for()
+        until(lambda: not dashboard.view._ghost.value)
+        assert not dashboard.cell.ghost.visible
+    finally:
+        watcher.close()
+
+
+def test_residuals_over_time_and_what_the_drives_do(page, dashboard):
+    tab(page, "Residuals")
+    page.wait_for_function(f"() => ({PLOT})().includes('Joint 6, sweep 1')")
+    choose(page, "all sweeps over time")
+    page.wait_for_function(f"() => ({PLOT})().includes('over time')")
+    wait_for_text(page, "residuals", "129 points")
+    choose(page, "joint 6, sweep 1")
+    wait_for_text(page, "residuals", "17 points")
+    tab(page, "Drives")
+    wait_for_text(page, "drives", "Why:")
+    tab(page, "Axes")
+    page.wait_for_function(f"() => ({PLOT})().includes('How well')")
+
+
+def test_a_tab_that_was_closed_shows_the_new_solution_when_it_is_opened(page, dashboard):
+    tab(page, "Drives")
+    page.wait_for_function(f"() => ({PLOT})().includes('Joint 1')")
+    tab(page, "This sweep")
+    shot = dashboard.bench.state.shots[3]
+    dashboard.bench.exclude(shot.id, "a test")
+    found = dashboard.bench.solve()
+    # Nobody asked through the page, so that the worker did not think ahead.
+    tab(page, "Residuals")
+    wait_for_text(page, "residuals", "16 points")
+    assert dashboard.results.drawn is found
+    dashboard.bench.include(shot.id)
+    dashboard.bench.solve()
+
+
+def test_a_point_is_chosen_by_a_click_excluded_and_brought_back(page, dashboard):
+    bench = dashboard.bench
+    again = bench.measure_again(bench.state.shots[40].id)
+    kept = sum(shot.counts for shot in bench.state.shots)
+    page.wait_for_function(f"() => ({POINTS})() === {kept}")
+    point = np.array(again.taken.point_m)
+    for view in (dashboard.cell.arm, dashboard.cell.ghost, dashboard.cell._axes, dashboard.cell.stations):
+        view.visible = False
+    tab(page, "2 Measure")
+    fly_to(client_of(dashboard), Camera("close", point + np.array([0.15, 0.12, 0.08]), point, UP), 0.0)
+    page.wait_for_timeout(1200)
+    middle = page.evaluate(MIDDLE)
+    page.mouse.move(*middle)
+    page.wait_for_timeout(400)
+    page.mouse.click(*middle)
+    wait_for_text(page, "shot", f"Record {again.record}")
+    press(page, "Exclude")
+    until(lambda: bench.state.shot(again.id).verdict == "excluded")
+    page.wait_for_function(f"() => ({POINTS})() === {kept - 1}")
+    press(page, "Undo")
+    until(lambda: bench.state.shot(again.id).verdict == "kept")
+    page.wait_for_function(f"() => ({POINTS})() === {kept}")
+    for view in (dashboard.cell.arm, dashboard.cell._axes, dashboard.cell.stations):
+        view.visible = True
+
+
+def test_a_slider_moves_the_arm_and_a_button_brings_it_back(page, dashboard):
+    tab(page, "View")
+    group(page, "Pose that is drawn")
+    page.wait_for_timeout(300)
+    at_first = page.evaluate(ARM)
+    page.get_by_role("slider").filter(visible=True).last.focus()
+    for _ in range(5):
+        page.keyboard.press("ArrowRight")
+        page.wait_for_timeout(80)
+    page.wait_for_function(f"before => ({ARM})() !== before", arg=at_first)
+    moved = dashboard.cell.commanded[5] - dashboard.bench.robot.commanded[5]
+    assert moved == pytest.approx(np.deg2rad(0.5), abs=np.deg2rad(0.06))
+    press(page, "Back to the robot's pose")
+    page.wait_for_function(f"before => ({ARM})() === before", arg=at_first)
