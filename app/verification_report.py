@@ -5,6 +5,7 @@ import numpy as np
 from app.figures.pose_errors import orientation_errors_figure, position_errors_figure
 from app.report_cells import aligned, count, number
 from app.report_page import Cell, Heading, Page, Plot, Section, ShownTable, page_html
+from core.end_effector import judged_points
 from core.repeatability import DistanceAccuracy, RepeatedPose, distance_accuracy, repeated_poses
 from core.verification import Errors, ModelErrors, Verification, calibrated_verdict, verdicts
 from core.version import VERSION
@@ -13,10 +14,11 @@ from core.wording import fixed, is_simulated, typeset
 MARKS = {"pass": "", "fail": "significant", "undecided": "muted"}
 MOST_ROWS = 500
 METHOD = (
-    "For every pose record that shows three or more targets on the last link, not on one line, the pose of the tool is "
-    "measured: the targets are a rigid body whose shape follows from the pose records alone, fitted to its points "
-    "weighted by their covariances. It is compared with the pose that each model predicts for the same commands. No "
-    "pose record was used in the calibration.",
+    "For every pose record that shows three or more targets on the last link, not on one line, or a 6-D target, the "
+    "pose of the tool is measured: three or more targets are a rigid body whose shape follows from the pose records "
+    "alone, fitted to its points weighted by their covariances. It is compared with the pose that each model predicts "
+    "for the same commands. A record that shows fewer targets has a position error alone, that of the middle of its "
+    "targets. No pose record was used in the calibration.",
     "Both models stand on the base frame that the calibration found. Position error: the distance between the measured "
     "and the predicted origin of the tool. Orientation error: the angle of the rotation between them. Both contain "
     "what the arm does differently on every visit; their uncertainties are those of the measurement.",
@@ -64,7 +66,9 @@ def summary(found: Verification) -> tuple[str, ...]:
         f"Mean position error over {found.nominal.position.count} poses: {_length(found.nominal.position)} nominal, "
         f"{_length(found.calibrated.position)} calibrated.",
         f"Mean orientation error: {_angle(found.nominal.orientation)} nominal, "
-        f"{_angle(found.calibrated.orientation)} calibrated.",
+        f"{_angle(found.calibrated.orientation)} calibrated."
+        if found.nominal.orientation.count
+        else "No orientation was measured.",
     ]
     verdict = calibrated_verdict(found)
     if verdict:
@@ -77,7 +81,7 @@ def _length(errors: Errors) -> str:
 
 
 def _angle(errors: Errors) -> str:
-    return f"{fixed(errors.mean, 4)} rad"
+    return f"{fixed(errors.mean, 4)} rad" if errors.count else "not measured"
 
 
 def _key_numbers(found: Verification) -> tuple[tuple[str, str], ...]:
@@ -100,7 +104,7 @@ def _facts(found: Verification) -> tuple[tuple[str, str], ...]:
     return (
         ("Robot", campaign.robot.name),
         ("Instrument", campaign.instrument.kind),
-        ("Judged point", "origin of the tool" if measured.reference == "tool" else "middle of the targets"),
+        ("Judged point", judged_points(measured)),
         ("Targets", f"{names}; place on the link known: {', '.join(measured.anchors) or 'none'}"),
         ("Calibrated with", found.arm.source or "(a campaign without a title)"),
         ("Software", f"trueaxis {VERSION}"),
@@ -111,11 +115,10 @@ def _facts(found: Verification) -> tuple[tuple[str, str], ...]:
 
 def _errors(found: Verification) -> Section:
     bars = "Bars are ±2 standard uncertainties of the measurement, dotted lines the means."
-    plots = (
-        Plot(position_errors_figure(found), f"As figure 9 of Sultan and Wager. {bars}"),
-        Plot(orientation_errors_figure(found), f"As figure 10 of Sultan and Wager. {bars}"),
-    )
-    return Section("errors", "Errors of the arm", plots=plots, tables=(_summary_table(found),))
+    plots = [Plot(position_errors_figure(found), f"As figure 9 of Sultan and Wager. {bars}")]
+    if found.nominal.orientation.count:
+        plots.append(Plot(orientation_errors_figure(found), f"As figure 10 of Sultan and Wager. {bars}"))
+    return Section("errors", "Errors of the arm", plots=tuple(plots), tables=(_summary_table(found),))
 
 
 def _summary_table(found: Verification) -> ShownTable:

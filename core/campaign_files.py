@@ -74,12 +74,15 @@ def _title(top: TomlTable) -> str:
 
 def _instrument(top: TomlTable) -> Instrument:
     table = top.table("instrument")
-    table.no_bare("sigma_mm")
+    table.no_bare("sigma_mm", "turn_sigma_mrad")
     kind = table.choice("kind", INSTRUMENT_KINDS, "other")
     sigma = None
     if "sigma_mm" in table:
         sigma = to_si(table.number("sigma_mm", low=1e-9), "mm")
-    return Instrument(kind, sigma, table.free_texts(("kind", "sigma_mm")))
+    turn = None
+    if "turn_sigma_mrad" in table:
+        turn = to_si(table.number("turn_sigma_mrad", low=1e-9), "mrad")
+    return Instrument(kind, sigma, table.free_texts(("kind", "sigma_mm", "turn_sigma_mrad")), turn)
 
 
 def _targets(top: TomlTable, robot: Robot) -> tuple[Target, ...]:

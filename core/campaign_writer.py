@@ -51,6 +51,8 @@ def _instrument_lines(campaign: Campaign) -> list[str]:
     lines = ["[instrument]", f"kind = {toml_text(instrument.kind)}"]
     if instrument.sigma_m is not None:
         lines.append(toml_quantity("sigma_mm", instrument.sigma_m))
+    if instrument.turn_sigma_rad is not None:
+        lines.append(toml_quantity("turn_sigma_mrad", instrument.turn_sigma_rad))
     return lines + _text_lines(instrument.description)
 
 

@@ -1,44 +1,27 @@
-"""Where the end-effector really was: measured poses of its tool, by three or more targets on it.
+"""Where the end-effector really was: measured poses of its tool, by whatever was seen of the last link.
 
-What is seen is a body of targets; what is asked for is the tool. How the body sits on the last link has to come from
-somewhere, and not from the poses that are to be judged: a body fitted to all of them would take every constant error of
-the arm for a place of the body, and hide it. So, in this order:
+    three or more targets, not on one line     the whole pose                      core/body_poses.py
+    a 6-D target                               the whole pose                      core/framed_poses.py
+    fewer targets                              a place only, that of the targets   core/point_places.py
 
-1. The **shape** of the body (how its targets stand to each other) follows from the pose records alone, without any
-   model of the arm (generalised Procrustes, ``core/rigid_pose.py``).
-2. Targets of which it is known where they sit on the link are the body's **anchors** and held there: by the owner's
-   statement (``xyz_mm``) or by the calibration's sweeps (at the paper's campaign: T1), whichever is more certain.
-   Three of them place the body altogether.
-3. What anchors leave free (with one: a turn about it) is taken for each pose from the **other** poses, as the
-   calibrated arm has them: leave-one-out, so that no pose is judged by a body that was fitted to it.
-
-The same body, so placed, judges both the nominal and the calibrated arm. Where step 3 is needed, the tool is fixed to
-its targets rather than to the last axis: an error of that axis's direction turns the tool by the same in every pose,
-and no target can show it. Such a constant turn is left out of the errors and of their uncertainty; ``free_turn`` tells.
+A 6-D target is taken rather than a body of targets, unless the places of three of these are known: then nothing of the
+body is left to be taken from other poses.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
+from core.body_poses import Body, body_of, body_poses, enlarged
 from core.calibrated_arm import CalibratedArm
 from core.errors import CampaignError
-from core.geometry import Array, apply, invert, skew, transform
-from core.kinematics import link_frames
+from core.framed_poses import framed_poses, framed_target
+from core.geometry import Array
+from core.link_poses import TARGETS, TOOL, LinkPoses, as_the_arm_has_them, known_places
 from core.measurements import Campaign
-from core.rigid_pose import PointSets, RigidPoses, can_be_placed, fit_body, fit_poses
-from core.rotations import vectors_of_rotations
+from core.point_places import point_places
+from core.rigid_pose import PointSets, can_be_placed
 from core.standstills import Standstills, standstills
-
-FEWEST_FREEDOMS = 10
-"""With fewer degrees of freedom the scatter of the targets says nothing about the stated covariance."""
-UNLIKELY = 1e-3
-"""A pose stands out where its points have less chance than this, times the number of poses."""
-BEYOND_CHANCE = 0.01
-"""Scatter that has less chance than this enlarges the stated covariance."""
-ANCHORED = 1e-6
-"""Weight of what the poses say against what the anchors say."""
 
 
 @dataclass(frozen=True)
@@ -46,29 +29,38 @@ class EndEffector:
     """Measured poses of a reference frame on the last link."""
 
     seen: Standstills
-    """The standstills that show it: three or more targets, not on one line."""
+    """The standstills that show it."""
     skipped: tuple[int, ...]
     """Poses that show too little."""
-    reference: str
-    """Whose position it is: ``tool``, or ``targets`` for the middle of the targets."""
+    reference: tuple[str, ...]
+    """Whose position each is: ``tool``, or ``targets`` for the middle of the targets, (k,)."""
     on_link: Array
-    """From the reference frame to the frame of the last link, (4, 4)."""
+    """From the reference frame to the frame of the last link, (k, 4, 4)."""
     pose: Array
-    """From the reference frame to the instrument's frame, (k, 4, 4)."""
+    """From the reference frame to the instrument's frame, (k, 4, 4); a rotation is NaN where only a place was seen."""
     own_covariance: Array
-    """Of its shift and turn, by the noise of this pose's points, (k, 6, 6), m and rad, in the instrument's frame."""
+    """Of its shift and turn, by the noise of this pose, (k, 6, 6), m and rad, in the instrument's frame."""
     shared: Array
-    """How shift and turn follow from an error in the body's placement, (k, 6, 6)."""
+    """How shift and turn follow from an error in the targets' placement, (k, 6, q)."""
     placement_covariance: Array
-    """Of that placement on the link, the same for all poses, (6, 6)."""
+    """Of that placement on the link, the same for all poses, (q, q)."""
     anchors: tuple[str, ...]
     """Targets whose place on the link is known."""
     free_turn: bool
-    """Whether anchors leave something free, which the other poses then tell."""
+    """Whether a turn of the link that is the same in all poses cannot show."""
+    framed: str
+    """The 6-D target by which turns were measured; empty: none."""
+    framed_sigma_rad: float | None
+    """Standard deviation of each component of its turn; None: not known, and taken from the scatter between poses."""
     noise_factor: float
     """By which the stated covariances were enlarged, because the targets scatter by more."""
     suspects: tuple[int, ...]
     """Poses whose points do not fit the body's shape: less than one chance in a thousand."""
+
+    @property
+    def turned(self) -> np.ndarray:
+        """Of which poses the turn was measured, boolean, (k,)."""
+        return np.isfinite(self.pose[:, 0, 0])
 
     @property
     def covariance(self) -> Array:
@@ -76,62 +68,74 @@ class EndEffector:
         return self.own_covariance + self.shared @ self.placement_covariance @ np.swapaxes(self.shared, 1, 2)
 
     def some(self, keep: np.ndarray) -> "EndEffector":
-        """Some of the poses, by index or flag; what is known of the body stays."""
+        """Some of the poses, by index or flag; what is known of the targets stays."""
+        chosen = np.arange(len(self.pose))[keep]
         return replace(
             self,
             seen=self.seen.some(keep),
+            reference=tuple(self.reference[k] for k in chosen),
+            on_link=self.on_link[keep],
             pose=self.pose[keep],
             own_covariance=self.own_covariance[keep],
             shared=self.shared[keep],
         )
 
 
+@dataclass(frozen=True)
+class _Split:
+    """Which standstills are judged by what, indices each."""
+
+    body: np.ndarray
+    framed: np.ndarray
+    column: int
+    """Of the 6-D target."""
+    single: np.ndarray
+
+
 def measured_poses(campaign: Campaign, arm: CalibratedArm) -> EndEffector:
-    """The measured poses of the tool (or, for a robot without one, of the middle of its targets).
+    """The measured poses of the tool, or places of targets where no more was seen.
 
     Raises:
-        CampaignError: no pose shows three targets that are not on one line, or a single one does and it is not known
-            how they sit.
+        CampaignError: nothing of the last link was seen of which it can be told where it sits, or a single pose shows
+            three targets and it is not known how they sit.
     """
     records = standstills(campaign, arm.noise_m)
-    on_link = _as_the_arm_has_them(records, arm)
-    body = np.stack([np.median(on_link[records.points.seen[:, j], j], axis=0) for j in range(len(records.target))])
-    placed = can_be_placed(body, records.points.seen)
-    if not placed.any():
-        raise CampaignError("no pose shows three or more targets on the last link that are not on one line")
-    seen = _selected(records, placed)
-    body = fit_body(body[np.isin(records.target, seen.target)], seen.points)
-    factor, seen, suspects = _judged(body, seen)
-    rigid = fit_poses(body, seen.points)
-    anchors, known = _anchors(campaign, arm, seen)
-    frames = arm.base @ link_frames(arm.robot, arm.drives.net(seen.commanded))[:, -2]
-    each = invert(frames) @ rigid.transform
-    placement, spread = _placements(body, each, anchors, known)
-    tool, reference = _reference(arm, placement)
-    to_reference = invert(placement) @ tool
-    pose = rigid.transform @ to_reference
-    own = _carried(rigid.covariance, pose[:, :3, 3] - rigid.transform[:, :3, 3])
-    names = tuple(campaign.targets[t].name for t, held in zip(seen.target, anchors, strict=True) if held)
-    return EndEffector(
-        seen=seen,
-        skipped=tuple(int(p) for p in records.pose[~placed]),
-        reference=reference,
-        on_link=tool,
-        pose=pose,
-        own_covariance=own,
-        shared=_by_placement(pose, tool, _centre(body, placement, anchors)),
-        placement_covariance=spread,
-        anchors=names,
-        free_turn=not can_be_placed(body, anchors[None])[0],
-        noise_factor=factor,
-        suspects=suspects,
+    carried = as_the_arm_has_them(records, arm)
+    roughly = np.stack([np.median(carried[records.points.seen[:, j], j], axis=0) for j in range(len(records.target))])
+    split = _split(campaign, arm, records, roughly)
+    body = Body(roughly, 1.0, ())
+    if len(split.body):
+        own = _selected(records, split.body)
+        body = body_of(roughly[np.isin(records.target, own.target)], own)
+    records = enlarged(records, body.factor)
+    sigma_rad = _framed_sigma(campaign, records)
+    parts = []
+    if len(split.body):
+        parts.append(body_poses(campaign, arm, _selected(records, split.body), split.body, body))
+    if len(split.framed):
+        parts.append(framed_poses(campaign, arm, records.some(split.framed), split.framed, split.column, sigma_rad))
+    parts.append(point_places(campaign, arm, records, split.single))
+    framed = campaign.targets[records.target[split.column]].name if len(split.framed) else ""
+    return _joined(records, [part for part in parts if len(part.row)], body, framed, sigma_rad)
+
+
+def _split(campaign: Campaign, arm: CalibratedArm, records: Standstills, roughly: Array) -> _Split:
+    seen = records.points.seen
+    held, _ = known_places(campaign, arm, records)
+    column, framed = framed_target(records)
+    if framed.sum() < 2:
+        framed = np.zeros(len(seen), dtype=bool)
+    placed = can_be_placed(roughly, seen)
+    framed = framed & ~can_be_placed(roughly, seen & held)
+    placed = placed & ~framed
+    return _Split(np.flatnonzero(placed), np.flatnonzero(framed), column, np.flatnonzero(~placed & ~framed))
+
+
+def _framed_sigma(campaign: Campaign, records: Standstills) -> float | None:
+    """Standard deviation of a component of a 6-D target's turn: as stated, or as repeated shots have it."""
+    return (
+        campaign.instrument.turn_sigma_rad if campaign.instrument.turn_sigma_rad is not None else records.turn_sigma_rad
     )
-
-
-def _as_the_arm_has_them(records: Standstills, arm: CalibratedArm) -> Array:
-    """The measured points carried into the frame of the last link by the calibrated arm, (k, j, 3)."""
-    frames = arm.base @ link_frames(arm.robot, arm.drives.net(records.commanded))[:, -2]
-    return apply(invert(frames)[:, None], records.points.point_m)
 
 
 def _selected(records: Standstills, keep: np.ndarray) -> Standstills:
@@ -139,128 +143,55 @@ def _selected(records: Standstills, keep: np.ndarray) -> Standstills:
     kept = records.some(keep)
     points, shown = kept.points, kept.points.seen.any(axis=0)
     chosen = PointSets(points.point_m[:, shown], points.covariance_m2[:, shown], points.seen[:, shown])
-    return replace(kept, target=kept.target[shown], points=chosen)
+    return replace(
+        kept,
+        target=kept.target[shown],
+        points=chosen,
+        rotation=kept.rotation[:, shown],
+        turn_shots=kept.turn_shots[:, shown],
+    )
 
 
-def _judged(body: Array, seen: Standstills) -> tuple[float, Standstills, tuple[int, ...]]:
-    """Stated covariances enlarged where the targets scatter by more, and poses that stand out even then."""
-    found = fit_poses(body, seen.points)
-    # Finding the shape has cost as many freedoms as it has: three a target but for a rigid motion.
-    freedoms = int(found.degrees_of_freedom.sum()) - (3 * len(body) - 6)
-    worst = _gross(found)
-    factor = 1.0
-    total, extra = found.chi_square.sum() - found.chi_square[worst].sum(), found.degrees_of_freedom[worst].sum()
-    if freedoms - extra >= FEWEST_FREEDOMS and chdtrc(freedoms - extra, total) < BEYOND_CHANCE:
-        factor = float(np.sqrt(total / (freedoms - extra)))
-    points = replace(seen.points, covariance_m2=seen.points.covariance_m2 * factor**2)
-    chance = chdtrc(found.degrees_of_freedom, found.chi_square / factor**2) * len(seen.pose)
-    return factor, replace(seen, points=points), tuple(int(p) for p in seen.pose[chance < UNLIKELY])
-
-
-def _gross(found: RigidPoses) -> np.ndarray:
-    """Rows of poses that stand out, a fifth of all at most, so that a few gross errors do not count as noise."""
-    chance = chdtrc(found.degrees_of_freedom, found.chi_square)
-    worst = np.argsort(chance)[: len(chance) // 5]
-    return worst[chance[worst] * len(chance) < UNLIKELY]
-
-
-def _anchors(campaign: Campaign, arm: CalibratedArm, seen: Standstills) -> tuple[np.ndarray, Array]:
-    """Which targets have a known place, (j,), and what is known of each: place on the link and its std, (j, 6)."""
-    at_rest = arm.base @ link_frames(arm.robot, np.zeros((1, arm.robot.joint_count)))[0, -2]
-    swept = {target.name: target for target in arm.targets if target.link == arm.robot.joint_count}
-    known = np.full((len(seen.target), 6), np.nan)
-    for row, index in enumerate(seen.target):
-        target = campaign.targets[index]
-        found, std = swept.get(target.name), np.full(3, np.inf)
-        if found is not None:
-            std = np.nan_to_num(found.std_m)
-            known[row] = [*apply(invert(at_rest), found.point_m), *std]
-        if target.point_m is not None and target.sigma_m < np.sqrt(np.mean(std**2)):
-            known[row] = [*target.point_m, *[target.sigma_m] * 3]
-    return np.isfinite(known[:, 0]), known
-
-
-def _placements(body: Array, each: Array, anchors: np.ndarray, known: Array) -> tuple[Array, Array]:
-    """Where the body sits on the link, and how uncertain that is.
-
-    Returns:
-        From the body to the link, for each pose by what the anchors and the other poses say, (k, 4, 4); covariance of a
-        shift of the anchors' middle (the body's, without any) and of a turn about it, (6, 6).
-    """
-    count = len(each)
-    held = np.flatnonzero(anchors)
-    whole = bool(can_be_placed(body, anchors[None])[0])
-    if count == 1 and not whole:
+def _joined(
+    records: Standstills, parts: list[LinkPoses], body: Body, framed: str, sigma_rad: float | None
+) -> EndEffector:
+    """All kinds of evidence as one, in the order of the standstills; placements of different kinds are independent."""
+    if not parts:
         raise CampaignError(
-            "one pose alone shows three targets, and the calibration does not know the places of three of them: "
-            "how they sit cannot be told from how the arm stands"
+            "no pose shows three or more targets on the last link that are not on one line, a 6-D target, or a target "
+            "of which it is known or seen elsewhere where it sits"
         )
-    places = apply(each[:, None], body[None])
-    others = places if whole else (places.sum(axis=0) - places) / (count - 1)
-    goal = np.where(anchors[:, None], known[:, :3], others)
-    weight = np.where(anchors, 1.0, 0.0 if whole else ANCHORED) if len(held) else np.ones(len(body))
-    # One covariance stands for a weight; an anchor is held, the others turn the body about it.
-    spread = np.eye(3) / np.maximum(weight, 1e-12)[:, None, None] * 1e-6
-    seen = np.broadcast_to(weight > 0, (count, len(body)))
-    placement = fit_poses(body, PointSets(goal, np.broadcast_to(spread, (*goal.shape, 3)), seen)).transform
-    return placement, _placement_covariance(body, each, anchors, known, whole)
+    row = np.concatenate([part.row for part in parts])
+    order = np.argsort(row)
+    widths = [part.placement_covariance.shape[0] for part in parts]
+    ends = np.cumsum(widths)
+    shared, placement = np.zeros((len(row), 6, ends[-1])), np.zeros((ends[-1], ends[-1]))
+    starts = np.cumsum([0, *(len(part.row) for part in parts)])
+    for k, part in enumerate(parts):
+        own = slice(ends[k] - widths[k], ends[k])
+        shared[starts[k] : starts[k + 1], :, own] = part.shared
+        placement[own, own] = part.placement_covariance
+    reference = [part.reference for part in parts for _ in part.row]
+    return EndEffector(
+        seen=_selected(records, row[order]),
+        skipped=tuple(int(p) for p in np.delete(records.pose, row)),
+        reference=tuple(reference[k] for k in order),
+        on_link=np.concatenate([part.on_link for part in parts])[order],
+        pose=np.concatenate([part.pose for part in parts])[order],
+        own_covariance=np.concatenate([part.own_covariance for part in parts])[order],
+        shared=shared[order],
+        placement_covariance=placement,
+        anchors=tuple(dict.fromkeys(name for part in parts for name in part.anchors)),
+        free_turn=any(part.free_turn for part in parts),
+        framed=framed,
+        framed_sigma_rad=sigma_rad,
+        noise_factor=body.factor,
+        suspects=body.suspects,
+    )
 
 
-def _placement_covariance(body: Array, each: Array, anchors: np.ndarray, known: Array, whole: bool) -> Array:
-    mean = each.mean(axis=0)
-    if whole:
-        spread = known[anchors, 3:, None] ** 2 * np.eye(3)
-        fitted = fit_poses(
-            body[anchors],
-            PointSets(
-                known[None, anchors, :3], spread[None] + 1e-18 * np.eye(3), np.ones((1, anchors.sum()), dtype=bool)
-            ),
-        )
-        middle = body[anchors].mean(axis=0)
-        return _carried(fitted.covariance, fitted.transform[:, :3, :3] @ middle)[0]
-    turns = vectors_of_rotations(each[:, :3, :3] @ _mean_rotation(each).T)
-    out = np.zeros((6, 6))
-    out[3:, 3:] = np.cov(turns.T) / len(each)
-    if anchors.any():
-        out[:3, :3] = np.diag((known[anchors, 3:] ** 2).mean(axis=0) / anchors.sum())
-    else:
-        out[:3, :3] = np.cov((each[:, :3, 3] - mean[:3, 3]).T) / len(each)
-    return out
-
-
-def _mean_rotation(each: Array) -> Array:
-    """The rotation nearest to the mean of some, (3, 3)."""
-    u, _, vt = np.linalg.svd(each[:, :3, :3].mean(axis=0))
-    return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-
-
-def _centre(body: Array, placement: Array, anchors: np.ndarray) -> Array:
-    """The point on the link about which the placement is uncertain by a turn, for each pose, (k, 3)."""
-    return apply(placement, body[anchors].mean(axis=0) if anchors.any() else np.zeros(3))
-
-
-def _reference(arm: CalibratedArm, placement: Array) -> tuple[Array, str]:
-    """The frame whose pose is judged, seen from the last link, and what it is."""
-    tool = arm.nominal.link_transforms[-1]
-    if not np.array_equal(tool, np.eye(4)):
-        return tool, "tool"
-    return transform(np.eye(3), placement[:, :3, 3].mean(axis=0)), "targets"
-
-
-def _carried(covariance: Array, lever_m: Array) -> Array:
-    """Covariance of the shift of a point a lever away, and of the turn, (k, 6, 6)."""
-    carry = np.broadcast_to(np.eye(6), covariance.shape).copy()
-    carry[:, :3, 3:] = -skew(lever_m)
-    return carry @ covariance @ np.swapaxes(carry, 1, 2)
-
-
-def _by_placement(pose: Array, tool: Array, centre: Array) -> Array:
-    """Shift and turn of the reference frame for an error of the body's placement on the link, (k, 6, 6).
-
-    If the body really sits shifted by t and turned by w about the centre, the tool is off by the opposite.
-    """
-    rotation = pose[:, :3, :3] @ tool[:3, :3].T
-    out = np.zeros((len(pose), 6, 6))
-    out[:, :3, :3] = out[:, 3:, 3:] = -rotation
-    out[:, :3, 3:] = rotation @ skew(tool[:3, 3] - centre)
-    return out
+def judged_points(measured: EndEffector) -> str:
+    """Whose position was judged, in words."""
+    kinds = set(measured.reference)
+    words = {TOOL: "origin of the tool", TARGETS: "middle of the targets"}
+    return " or ".join(words[kind] for kind in (TOOL, TARGETS) if kind in kinds)

@@ -38,6 +38,8 @@ class Instrument:
     """Stated standard deviation of one coordinate of a point; None: not stated."""
     description: dict[str, str] = field(default_factory=dict)
     """Whatever else the owner wrote down: model, serial number, last calibration."""
+    turn_sigma_rad: float | None = None
+    """Stated standard deviation of each component of a 6-D target's turn; None: not stated."""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.geometry import Array
+from core.link_poses import TOOL, mean_rotation
 from core.rotations import vectors_of_rotations
 from core.standstills import SAME_COMMAND
 from core.verification import ModelErrors, Verification
@@ -26,7 +27,7 @@ MOST_PAIRS = 200_000
 
 @dataclass(frozen=True)
 class Accuracy:
-    """AP of one commanded pose under one model."""
+    """AP of one commanded pose under one model; of the orientation NaN where none was measured."""
 
     position_m: float
     orientation_rad: float
@@ -43,7 +44,7 @@ class RepeatedPose:
     repeatability_m: float
     """RP of the position."""
     repeatability_rad: Array
-    """RP of the orientation about x, y and z of the robot's base, (3,)."""
+    """RP of the orientation about x, y and z of the robot's base, (3,); NaN where none was measured."""
 
     @property
     def visits(self) -> int:
@@ -69,6 +70,7 @@ def repeated_poses(found: Verification) -> tuple[RepeatedPose, ...]:
 def distance_accuracy(found: Verification, model: ModelErrors) -> DistanceAccuracy | None:
     """AD of a model over all pairs of commanded poses; None with fewer than two of them."""
     visits = _visits(found)
+    visits = _of_one_point(found, visits)
     if len(visits) < 2:
         return None
     measured = np.stack([found.measured.pose[rows, :3, 3].mean(axis=0) for rows in visits])
@@ -84,20 +86,37 @@ def distance_accuracy(found: Verification, model: ModelErrors) -> DistanceAccura
 
 
 def _visits(found: Verification) -> list[np.ndarray]:
-    """Rows of the measured poses by commands, in the order of their first visit."""
+    """Rows of the measured poses by commands, and by whose place was measured, in the order of their first visit."""
     rounded = np.round(found.measured.seen.commanded / SAME_COMMAND).astype(np.int64)
-    _, first, which = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    keys = np.concatenate([rounded, _points(found)[:, None]], axis=1)
+    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     return [np.flatnonzero(which.ravel() == k) for k in np.argsort(first)]
 
 
+def _points(found: Verification) -> np.ndarray:
+    """Whose place each row is: numbers that are the same for the tool, or for the same targets, (k,)."""
+    tool = np.array([reference == TOOL for reference in found.measured.reference])
+    seen = found.measured.seen.points.seen & ~tool[:, None]
+    return np.unique(np.concatenate([tool[:, None], seen], axis=1), axis=0, return_inverse=True)[1].ravel()
+
+
+def _of_one_point(found: Verification, visits: list[np.ndarray]) -> list[np.ndarray]:
+    """Those visits that show the place that is shown most often."""
+    points = _points(found)
+    own = np.array([points[rows[0]] for rows in visits])
+    return [rows for rows, point in zip(visits, own, strict=True) if point == np.bincount(own).argmax()]
+
+
 def _repeated(found: Verification, rows: np.ndarray) -> RepeatedPose:
-    place, rotation = found.measured.pose[rows, :3, 3], found.measured.pose[rows, :3, :3]
+    place = found.measured.pose[rows, :3, 3]
     middle = place.mean(axis=0)
     away = np.linalg.norm(place - middle, axis=1)
-    mean = _mean_rotation(rotation)
-    base = found.arm.base[:3, :3]
-    # Small turns about x, y and z commute, so that their components are the angles that the standard names.
-    turns = vectors_of_rotations(rotation @ mean.T) @ base
+    mean, turns = np.full((3, 3), np.nan), np.full((len(rows), 3), np.nan)
+    if found.measured.turned[rows].all():
+        rotation = found.measured.pose[rows, :3, :3]
+        mean = mean_rotation(rotation)
+        # Small turns about x, y and z commute, so that their components are the angles that the standard names.
+        turns = vectors_of_rotations(rotation @ mean.T) @ found.arm.base[:3, :3]
     return RepeatedPose(
         poses=tuple(int(p) for p in found.measured.seen.pose[rows]),
         nominal=_accuracy(found.nominal, rows, middle, mean),
@@ -109,10 +128,8 @@ def _repeated(found: Verification, rows: np.ndarray) -> RepeatedPose:
 
 def _accuracy(model: ModelErrors, rows: np.ndarray, middle: Array, mean: Array) -> Accuracy:
     predicted = model.predicted[rows[0]]
+    shift = float(np.linalg.norm(middle - predicted[:3, 3]))
+    if np.isnan(mean).any():
+        return Accuracy(shift, np.nan)
     turn = vectors_of_rotations((mean @ predicted[:3, :3].T)[None])[0]
-    return Accuracy(float(np.linalg.norm(middle - predicted[:3, 3])), float(np.linalg.norm(turn)))
-
-
-def _mean_rotation(rotation: Array) -> Array:
-    u, _, vt = np.linalg.svd(rotation.mean(axis=0))
-    return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return Accuracy(shift, float(np.linalg.norm(turn)))

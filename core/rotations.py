@@ -82,3 +82,11 @@ def vectors_of_rotations(rotation: ArrayLike) -> Array:
     sine = np.linalg.norm(q[:, 1:], axis=1)
     angle = 2 * np.arctan2(sine, q[:, 0])
     return q[:, 1:] * np.where(sine > 1e-150, angle / np.maximum(sine, 1e-150), 2.0)[:, None]
+
+
+def nearest_rotations(matrices: Array) -> Array:
+    """The rotations nearest to matrices, (m, 3, 3), in the sense of least squares (Kabsch 1976)."""
+    u, _, vt = np.linalg.svd(matrices)
+    signs = np.ones((len(matrices), 3))
+    signs[:, 2] = np.linalg.det(u @ vt)
+    return (u * signs[:, None]) @ vt

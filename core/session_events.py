@@ -102,6 +102,8 @@ class InstrumentChosen(Event, frozen=True, tag="instrument"):
     """Promised standard deviation of one coordinate."""
     description: dict[Line, Text] = {}
     """Model, serial number, last calibration, ..."""
+    turn_sigma_rad: Annotated[float, Meta(gt=0, le=1e12)] | None = None
+    """Promised standard deviation of each component of a 6-D target's turn."""
 
 
 class Planned(Event, frozen=True, tag="plan"):

@@ -84,7 +84,7 @@ def _targets(state: State, entry: Entry, event: TargetsNamed) -> dict[str, Any]:
 
 
 def _instrument(state: State, entry: Entry, event: InstrumentChosen) -> dict[str, Any]:
-    return {"instrument": Instrument(event.instrument, event.sigma_m, dict(event.description))}
+    return {"instrument": Instrument(event.instrument, event.sigma_m, dict(event.description), event.turn_sigma_rad)}
 
 
 def _plan(state: State, entry: Entry, event: Planned) -> dict[str, Any]:

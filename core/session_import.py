@@ -60,7 +60,9 @@ def campaign_events(folder: Path | str) -> list[Event]:
         OperatorNamed(_line(notes.pop(OPERATOR, ""))),
         _robot_event(Path(folder)),
         TargetsNamed(tuple(TargetEntry(t.name, t.link, t.point_m, t.sigma_m) for t in campaign.targets)),
-        InstrumentChosen(instrument.kind, instrument.sigma_m, _texts(instrument.description)),
+        InstrumentChosen(
+            instrument.kind, instrument.sigma_m, _texts(instrument.description), instrument.turn_sigma_rad
+        ),
         Planned(sweeps_of(campaign), None if campaign.home is None else campaign.home, campaign.joint_values),
     ]
     events += [Fact(_line(key), _text(value)) for key, value in notes.items()]

@@ -1,6 +1,6 @@
 """The pose records of a campaign, standstill by standstill: commands, and points of the targets on the last link."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,7 +8,10 @@ from core.errors import CampaignError
 from core.geometry import Array
 from core.measurements import POSE, Campaign
 from core.rigid_pose import PointSets
+from core.rotations import nearest_rotations, rotations_of_quaternions, vectors_of_rotations
 
+FEWEST_FREEDOMS = 12
+"""With fewer degrees of freedom repeated turns say nothing about their scatter."""
 SAME_COMMAND = 1e-9
 """Commands that differ by less are one, rad or m."""
 
@@ -27,6 +30,17 @@ class Standstills:
     """Which of the campaign's targets are on the last link and were seen, (j,)."""
     points: PointSets
     """Their points, repeated shots averaged, (k, j)."""
+    rotation: Array
+    """How 6-D targets are turned, from their own frame to the instrument's, (k, j, 3, 3); NaN where not seen."""
+    turn_shots: np.ndarray
+    """How many shots went into each turn, (k, j)."""
+    turn_sigma_rad: float | None
+    """Standard deviation of each component of a single turn, by repeated shots; None: too few of them."""
+
+    @property
+    def framed(self) -> np.ndarray:
+        """Of which targets the turn was seen as well, boolean, (k, j)."""
+        return self.points.seen & np.isfinite(self.rotation[..., 0, 0])
 
     @property
     def compensated(self) -> np.ndarray:
@@ -36,7 +50,15 @@ class Standstills:
     def some(self, keep: np.ndarray) -> "Standstills":
         """Some of the standstills, by index or flag, with the same targets."""
         points = PointSets(self.points.point_m[keep], self.points.covariance_m2[keep], self.points.seen[keep])
-        return Standstills(self.pose[keep], self.commanded[keep], self.wanted[keep], self.target, points)
+        return replace(
+            self,
+            pose=self.pose[keep],
+            commanded=self.commanded[keep],
+            wanted=self.wanted[keep],
+            points=points,
+            rotation=self.rotation[keep],
+            turn_shots=self.turn_shots[keep],
+        )
 
 
 def standstills(campaign: Campaign, noise_m: float) -> Standstills:
@@ -67,7 +89,9 @@ def standstills(campaign: Campaign, noise_m: float) -> Standstills:
     covariance = table.covariance_m2[rows]
     stated = np.isfinite(covariance).all(axis=(1, 2))
     covariance = np.where(stated[:, None, None], covariance, noise_m**2 * np.eye(3))
-    commanded = table.commanded[first]
+    commanded, shape = table.commanded[first], (len(pose), len(target))
+    quaternion = None if table.target_quaternion is None else table.target_quaternion[rows]
+    rotation, shots, turn_sigma = _turns(which, column, quaternion, shape)
     wanted = commanded if table.wanted is None else table.wanted[first]
     return Standstills(
         pose=pose,
@@ -75,7 +99,29 @@ def standstills(campaign: Campaign, noise_m: float) -> Standstills:
         wanted=np.where(np.isnan(wanted), commanded, wanted),
         target=target,
         points=_averaged(which, column, table.point_m[rows], covariance),
+        rotation=rotation,
+        turn_shots=shots,
+        turn_sigma_rad=turn_sigma,
     )
+
+
+def _turns(
+    row: np.ndarray, column: np.ndarray, quaternion: Array | None, shape: tuple[int, int]
+) -> tuple[Array, np.ndarray, float | None]:
+    """Turns of 6-D targets, repeated shots averaged, (k, j, 3, 3), how many there were, and how far they scatter."""
+    mean, count = np.full((*shape, 3, 3), np.nan), np.zeros(shape, dtype=int)
+    given = np.zeros(len(row), dtype=bool) if quaternion is None else np.isfinite(quaternion).all(axis=1)
+    if quaternion is None or not given.any():
+        return mean, count, None
+    row, column, each = row[given], column[given], rotations_of_quaternions(quaternion[given])
+    total = np.zeros((*shape, 3, 3))
+    np.add.at(total, (row, column), each)
+    np.add.at(count, (row, column), 1)
+    seen = count > 0
+    mean[seen] = nearest_rotations(total[seen])
+    away = vectors_of_rotations(each @ np.swapaxes(mean[row, column], 1, 2))
+    freedoms = 3 * int((count[seen] - 1).sum())
+    return mean, count, float(np.sqrt(np.sum(away**2) / freedoms)) if freedoms >= FEWEST_FREEDOMS else None
 
 
 def _averaged(row: np.ndarray, column: np.ndarray, point_m: Array, covariance: Array) -> PointSets:

@@ -3,7 +3,7 @@
 import math
 
 SCALES = {
-    **{"rad": 1.0, "deg": math.pi / 180.0, "rad_s": 1.0, "deg_s": math.pi / 180.0},
+    **{"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "rad_s": 1.0, "deg_s": math.pi / 180.0},
     **{"m": 1.0, "mm": 1e-3, "m_s": 1.0, "mm_s": 1e-3, "mm2": 1e-6},
     **{"s": 1.0, "c": 1.0, "kg": 1.0, "nm": 1.0, "n": 1.0},
 }

@@ -1,10 +1,12 @@
 """How far the nominal and the calibrated arm miss poses that no fit has seen (figures 9 and 10).
 
-For every pose record that shows three or more targets on the end-effector, the measured pose of the tool
-(``core/end_effector.py``) is compared with the pose that each model predicts for the same commands:
+For every pose record that shows three or more targets on the end-effector, or a 6-D target, the measured pose of the
+tool (``core/end_effector.py``) is compared with the pose that each model predicts for the same commands:
 
     position error     the distance between measured and predicted origin of the tool
     orientation error  the angle of the rotation from the predicted to the measured tool
+
+A record that shows fewer targets has a position error alone, that of the middle of its targets.
 
 Both models stand on the same base: the robot's base frame as the calibration has it in the instrument's frame, by the
 rule of section 4 about the first axes. Errors contain what the arm does differently on every visit (its repeatability)
@@ -170,23 +172,26 @@ def predicted(robot: Robot, net: Array, measured: EndEffector) -> Array:
 def compared(measured: EndEffector, predicted: Array) -> ModelErrors:
     """Measured poses less others in the instrument's frame, (k, 4, 4)."""
     shift = measured.pose[:, :3, 3] - predicted[:, :3, 3]
-    turn = vectors_of_rotations(measured.pose[:, :3, :3] @ np.swapaxes(predicted[:, :3, :3], 1, 2))
+    turn, seen = np.full(shift.shape, np.nan), measured.turned
+    turn[seen] = vectors_of_rotations(measured.pose[seen, :3, :3] @ np.swapaxes(predicted[seen, :3, :3], 1, 2))
     return ModelErrors(predicted, shift, turn, _errors(measured, shift, 0), _errors(measured, turn, 3))
 
 
 def _errors(measured: EndEffector, vectors: Array, first: int) -> Errors:
     """Lengths of errors; their uncertainty is that along the error, and across it where the error is smaller."""
-    rows = slice(first, first + 3)
-    own, shared = measured.own_covariance[:, rows, rows], measured.shared[:, rows]
-    size = np.linalg.norm(vectors, axis=1)
-    along = vectors / np.maximum(size, 1e-300)[:, None]
-    variance = np.einsum("ki,kij,kj->k", along, measured.covariance[:, rows, rows], along)
-    count = max(len(vectors), 1)
+    rows, known = slice(first, first + 3), np.isfinite(vectors).all(axis=1)
+    value, std = np.full(len(vectors), np.nan), np.full(len(vectors), np.nan)
+    own, shared = measured.own_covariance[known, rows, rows], measured.shared[known, rows]
+    size = np.linalg.norm(vectors[known], axis=1)
+    along = vectors[known] / np.maximum(size, 1e-300)[:, None]
+    value[known] = size
+    std[known] = np.sqrt(np.einsum("ki,kij,kj->k", along, measured.covariance[known, rows, rows], along))
+    count = max(len(size), 1)
     pulled = np.einsum("ki,kij->j", along, shared) / count
     mean_variance = (
         np.einsum("ki,kij,kj->", along, own, along) / count**2 + pulled @ measured.placement_covariance @ pulled
     )
-    return Errors(size, np.sqrt(variance), float(np.sqrt(mean_variance)))
+    return Errors(value, std, float(np.sqrt(mean_variance)))
 
 
 def _ratio(before: float, after: float) -> float:
@@ -222,6 +227,24 @@ def _notes(campaign: Campaign, arm: CalibratedArm, measured: EndEffector) -> tup
     if measured.skipped:
         poses = ", ".join(map(str, measured.skipped))
         notes.append(f"too few targets to give a pose, left out: {poses}")
+    notes += _reference_notes(arm, measured)
+    if measured.suspects:
+        notes.append(f"targets do not fit their common shape in pose {', '.join(map(str, measured.suspects))}")
+    if measured.noise_factor > 1.2:
+        notes.append(f"the targets scatter {measured.noise_factor:.2g} times as much as their stated uncertainty")
+    return tuple(notes)
+
+
+def _reference_notes(arm: CalibratedArm, measured: EndEffector) -> list[str]:
+    """Whose place was judged, and what of it cannot show."""
+    notes = []
+    few = measured.seen.pose[~measured.turned]
+    if len(few):
+        which = "every pose" if len(few) == len(measured.pose) else f"pose {', '.join(map(str, few))}"
+        notes.append(
+            f"{which} shows fewer than three targets or such on one line: position only, that of the middle of its "
+            "targets and not of the tool"
+        )
     if not measured.anchors:
         notes.append(
             "of no target it is known where it sits on the last link: that is taken from the other poses, which hides "
@@ -234,8 +257,10 @@ def _notes(campaign: Campaign, arm: CalibratedArm, measured: EndEffector) -> tup
             "other poses: a turn of the last axis that is the same in all poses cannot show (the direction of that "
             f"axis has a standard uncertainty of {arm.last_axis_std_rad * 1e3:.2g} mrad)"
         )
-    if measured.suspects:
-        notes.append(f"targets do not fit their common shape in pose {', '.join(map(str, measured.suspects))}")
-    if measured.noise_factor > 1.2:
-        notes.append(f"the targets scatter {measured.noise_factor:.2g} times as much as their stated uncertainty")
-    return tuple(notes)
+    if measured.framed and measured.framed_sigma_rad is None:
+        notes.append(
+            f"how well the instrument measures the turn of {measured.framed} is not stated and was not repeated: its "
+            "scatter between poses is taken, which holds the arm's errors as well, so that stated uncertainties of "
+            "orientations are too large"
+        )
+    return notes

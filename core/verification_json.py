@@ -55,7 +55,7 @@ def _reference_record(found: Verification) -> Json:
     """Whose poses were judged, and how the targets were placed on the link."""
     measured = found.measured
     return {
-        "point": measured.reference,
+        "point": measured.reference[0] if len(set(measured.reference)) == 1 else "mixed",
         "anchors": list(measured.anchors),
         "turn_from_other_poses": bool(measured.free_turn),
         "noise_factor": number(measured.noise_factor),
@@ -71,6 +71,7 @@ def _pose_records(found: Verification) -> list[Json]:
     records = []
     for k, pose in enumerate(found.measured.seen.pose):
         record: Json = {"pose": int(pose), "targets": int(found.measured.seen.points.seen[k].sum())}
+        record["reference"] = found.measured.reference[k]
         record |= {name: number(errors.value[k] * scale) for name, (errors, scale) in kinds.items()}
         record["std"] = {name: number(errors.std[k] * scale) for name, (errors, scale) in kinds.items()}
         record["error_mm"] = {model: mm(shift[k]) for model, shift in shifts.items()}

@@ -46,7 +46,8 @@ RESULTS = """
 USE = """
     core.driven_robot core.subproblems core.closed_form core.pose_iteration core.pose_seeds core.inverse_kinematics
     core.calibrated_arm core.calibration_file core.pose_files core.compensation core.compensation_effect
-    core.rigid_pose core.standstills core.pose_visits core.end_effector
+    core.rigid_pose core.standstills core.pose_visits
+    core.link_poses core.body_poses core.framed_poses core.point_places core.end_effector
     core.verification core.pose_loop core.repeatability core.verification_json
     core.robot_export core.dh_export core.gap
     core.planning core.rivals

@@ -12,10 +12,11 @@ from core.campaign_files import read_campaign
 from core.verification import Limits, Verification, calibrated_verdict, verify
 from core.verification_json import verification_to_json
 
-EPILOG = """A pose counts where three or more targets on the last link were seen, not on one line. Where they sit on
-the link is taken from the sweeps of the calibration, or from xyz_mm in campaign.toml, and as far as neither tells,
-for each pose from the other poses. With limits every pose passes, fails, or is undecided: its error with two
-standard uncertainties more is within, with two less is not, or neither."""
+EPILOG = """A pose counts whole where three or more targets on the last link were seen, not on one line, or a 6-D
+target (columns target_qw, ...); else with the position of its targets alone. Where they sit on the link is taken from
+the sweeps of the calibration, or from xyz_mm in campaign.toml, and as far as neither tells, for each pose from the
+other poses. With limits every pose passes, fails, or is undecided: its error with two standard uncertainties more is
+within, with two less is not, or neither."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -69,9 +70,10 @@ def _summary(found: Verification, folder: Path) -> str:
     for name, unit, nominal, calibrated in rows:
         for word in ("mean", "max"):
             label = f"{name}, {word} [{unit}]"
-            before, after = (getattr(errors, word) * 1e3 for errors in (nominal, calibrated))
-            lines.append(f"  {label:<24}{before:>10.3f}{after:>14.3f}")
-    lines.append(f"  {'poses':<24}{nominal.count:>10}")
+            if nominal.count:
+                before, after = (getattr(errors, word) * 1e3 for errors in (nominal, calibrated))
+                lines.append(f"  {label:<24}{before:>10.3f}{after:>14.3f}")
+        lines.append(f"  {f'poses with {name}':<24}{nominal.count:>10}")
     if verdict := calibrated_verdict(found):
         lines.append(f"  {'within the limits':<24}{verdict:>24}")
     notes = [f"Note: {note}" for note in found.notes]
