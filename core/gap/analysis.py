@@ -29,6 +29,8 @@ AS_CALIBRATED, UNCALIBRATED = 1e-4, 1e-3
 STRAY, GEOMETRY_CLOSES = 2.5, 0.5
 """The geometry of a whole sim is off where its numbers stray by so many calibrated sizes, rms, and where letting them
 leaves at most such a part of the kept-out mean square."""
+LEFT_BY_CAUSES = 0.2
+"""Of the kept-out mean square: where other causes leave less, they are the answer."""
 NULL_QUANTILE, NULL_MARGIN = 0.9, 3.0
 """Of the largest evidence that noise alone makes; beyond a quantile it falls off as exp(-x)."""
 MOST_FLEXIBLE = 4
@@ -224,7 +226,7 @@ def _geometry_is_off(problem: Problem, evidence: Evidence, found: Found) -> bool
     fold = blocks(problem.sim.seen)
     kept = [KeptOut(problem, fold, prior, found.chosen.groups) for prior in (KNOWN, UNCALIBRATED)]
     closely, freely = (one.square_m2(found.chosen) for one in kept)
-    return freely < GEOMETRY_CLOSES * closely
+    return freely < GEOMETRY_CLOSES * closely and closely > LEFT_BY_CAUSES * kept[0].square_m2(Chosen())
 
 
 def null_threshold(problem: Problem, evidence: Evidence) -> float:

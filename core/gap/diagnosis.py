@@ -123,7 +123,7 @@ class Findings:
     def judge(self) -> Judge:
         a = self.analysis
         floor = float(np.mean(a.noise.floor_m2))
-        return Judge(a.problem, a.evidence, self.fold, a.geometry_prior, a.threshold, floor, a.found.chosen, a.given)
+        return Judge(a.problem, a.evidence, self.fold, a.geometry_prior, a.threshold, floor, a.found.chosen, a.found.worth, a.given)
 
     @cached_property
     def floor_m2(self) -> float:

@@ -10,14 +10,16 @@ from functools import cached_property
 
 import numpy as np
 
+from core.gap.effects.candidate import Candidate
 from core.gap.evidence import NOTHING, Chosen, Evidence, joined
 from core.gap.kept_out import KeptOut
 from core.gap.problem import Problem
 from core.gap.result import Place
 from core.geometry import Array
 
-LEAST_SHARE = 0.05
-"""Of the gap: what closes less is an imperfection of a stronger cause, or clutter."""
+SMOOTH = frozenset({"zero_offset", "ratio", "eccentricity", "linkage", "axis_wobble", "geometry"})
+"""Smooth functions of one joint; so is a mesh with fewer waves a turn than ``RIPPLE``."""
+RIPPLE = 6.0
 LOCALLY, GLOBALLY = 0.92, 0.75
 """Shares of what nameless functions close that a name must close to stand."""
 WEAKER = 0.10
@@ -57,6 +59,8 @@ class Judge:
     threshold: float
     floor_m2: float
     found: Chosen
+    worth: Chosen
+    """Those of what was found that are to be judged."""
     given: Chosen = NOTHING
     """Geometry that needs no judgement: it is there whatever else is."""
 
@@ -90,7 +94,7 @@ class Judge:
 
     @cached_property
     def kept_out(self) -> KeptOut:
-        groups = dict.fromkeys(self.everything.groups)
+        groups = dict.fromkeys((*self.everything.groups, *self.worth.groups))
         for chosen in (self.rest, self.lone, *self.local.values()):
             groups |= dict.fromkeys(chosen.groups)
         return KeptOut(self.problem, self.fold, self.geometry_prior, tuple(groups), self.geometry)
@@ -154,7 +158,7 @@ class Judge:
 
 def stands(judge: Judge) -> list[Stand]:
     """What can be said of each place where something acts, strongest first."""
-    kept = _worth_naming(judge, judge.found)
+    kept = _predicting(judge, judge.worth)
     out = []
     by_variable: dict[str, list[int]] = {}
     for k, group in enumerate(kept.groups):
@@ -177,13 +181,13 @@ def _steps_together(found: list[Stand]) -> list[Stand]:
     return [*rest, Stand(Place("quantisation"), together.groups, together.sizes, local)]
 
 
-def _worth_naming(judge: Judge, chosen: Chosen) -> Chosen:
-    """What is left when candidates that close next to nothing, given the others, are dropped one by one."""
+def _predicting(judge: Judge, chosen: Chosen) -> Chosen:
+    """What is left when candidates are dropped that make kept-out points no better."""
     while chosen.groups:
         whole = judge.square(chosen)
         lost = [judge.square(chosen.without(k)) - whole for k in range(len(chosen.groups))]
         least = int(np.argmin(lost))
-        if lost[least] >= LEAST_SHARE * judge.closable_m2:
+        if lost[least] > 0:
             break
         chosen = chosen.without(least)
     return chosen
@@ -205,7 +209,7 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen) -> list[St
         together = (without - judge.square(joined(elsewhere, _pick(here, same)))) / max(ceiling, 1e-300)
         if together >= LOCALLY:
             return [_stand(judge, here, same, together)]
-    pairs = [k for k in order[1:] if _effect(judge, here, k) != _effect(judge, here, first)]
+    pairs = [k for k in order[1:] if _make_a_pair(judge, here, first, k)]
     best = max(
         ((without - judge.square(joined(elsewhere, _pick(here, [first, k]))), k) for k in pairs), default=(0.0, -1)
     )
@@ -220,9 +224,16 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen) -> list[St
     return [Stand(place, groups.groups, groups.sizes, share)]
 
 
-def _effect(judge: Judge, chosen: Chosen, k: int) -> tuple[str, int | None]:
-    place = judge.problem.candidates[chosen.groups[k]].place
-    return place.effect, place.source
+def _make_a_pair(judge: Judge, here: Chosen, first: int, second: int) -> bool:
+    """Whether two names at one variable can both be right: two smooth functions of one joint imitate any third."""
+    names = [judge.problem.candidates[here.groups[k]] for k in (first, second)]
+    same = (names[0].place.effect, names[0].place.source) == (names[1].place.effect, names[1].place.source)
+    return not same and not all(_smooth(name) for name in names)
+
+
+def _smooth(candidate: Candidate) -> bool:
+    orders = dict(candidate.fixed)
+    return candidate.place.effect in SMOOTH or orders.get("order_1", np.inf) < RIPPLE
 
 
 def _place(judge: Judge, chosen: Chosen, k: int) -> Place:

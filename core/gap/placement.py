@@ -102,14 +102,14 @@ def _refined(sim: Sim, weights: Array) -> Sim:
     """Gauss-Newton steps on base and targets together."""
     slots = placement_slots(sim.seen)
     priors = placement_priors(sim.seen, slots)
-    start = sim.target_m
+    stated = _known_places(sim.seen)
     precision = np.where(np.isfinite(priors), 1.0 / np.maximum(priors, 1e-9) ** 2, 0.0)
     misfit = _misfit(sim, weights)
     for _ in range(ROUNDS):
         fields = sim.fields(slots)
         square = np.einsum("mck,m,mcl->kl", fields, weights, fields, optimize=True)
         pull = np.einsum("mck,m,mc->k", fields, weights, sim.seen.point_m - sim.points_m(), optimize=True)
-        pull -= precision * _from_start(sim, start, slots)
+        pull -= precision * _away(sim, stated, slots)
         square += np.diag(precision + WEAK * np.trace(square) / len(square))
         moved = with_placement(sim, slots, np.linalg.solve(square, pull))
         now = _misfit(moved, weights)
@@ -122,8 +122,9 @@ def _refined(sim: Sim, weights: Array) -> Sim:
     return sim
 
 
-def _from_start(sim: Sim, start: Array, slots: list[Slot]) -> Array:
-    away = sim.target_m - start
+def _away(sim: Sim, stated: Array, slots: list[Slot]) -> Array:
+    """How far targets are from where they are said to be, (k,)."""
+    away = sim.target_m - stated
     return np.array([away[s.index, s.axis] if s.part is Part.TARGET else 0.0 for s in slots])
 
 

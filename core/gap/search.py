@@ -8,6 +8,8 @@ from core.gap.evidence import NOTHING, Chosen, Evidence, Gains, joined
 from core.geometry import Array
 
 MOST_CAUSES = 6
+LEAST_SHARE = 0.05
+"""Of all log evidence: what adds less to the others is an imperfection of a stronger cause, or clutter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,6 +20,8 @@ class Found:
     alone: Array
     """Log evidence of each searched candidate standing alone, less the cost of choosing, by candidate; -inf: not searched."""
     alone_size: Array
+    worth: Chosen
+    """Those of them that are more than an imperfection of a stronger one."""
     log_evidence: float
     """Of all that is chosen, costs included, above placement and geometry alone."""
 
@@ -51,7 +55,28 @@ def search(
         if len(chosen.groups) > 1:
             chosen = _exchanged(evidence, among, cost, chosen, given)
     total = evidence.given(joined(given, chosen)) - sum(cost[g] for g in chosen.groups)
-    return Found(chosen, alone, alone_size, float(total))
+    return Found(chosen, alone, alone_size, worth_naming(evidence, among, cost, chosen, given), float(total))
+
+
+def worth_naming(evidence: Evidence, among: np.ndarray, cost: Array, chosen: Chosen, given: Chosen) -> Chosen:
+    """What is left when candidates that add next to nothing to the others are dropped, each reconsidered then."""
+    kept = _without_the_least(evidence, chosen, given)
+    if len(kept.groups) < len(chosen.groups) and len(kept.groups) > 1:
+        kept = _without_the_least(evidence, _exchanged(evidence, among, cost, kept, given), given)
+    elif len(kept.groups) == 1 and len(chosen.groups) > 1:
+        kept = _exchanged(evidence, among, cost, kept, given)
+    return kept
+
+
+def _without_the_least(evidence: Evidence, chosen: Chosen, given: Chosen) -> Chosen:
+    while len(chosen.groups) > 1:
+        bare, whole = evidence.given(given), evidence.given(joined(given, chosen))
+        lost = [whole - evidence.given(joined(given, chosen.without(k))) for k in range(len(chosen.groups))]
+        least = int(np.argmin(lost))
+        if lost[least] >= LEAST_SHARE * (whole - bare):
+            break
+        chosen = chosen.without(least)
+    return chosen
 
 
 def _scores(evidence: Evidence, among: np.ndarray, cost: Array, chosen: Chosen) -> tuple[Gains, Array]:
