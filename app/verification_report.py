@@ -2,10 +2,12 @@
 
 import numpy as np
 
-from app.figures.pose_errors import orientation_errors_figure, position_errors_figure
+from app.figures.pose_errors import loop_figures, orientation_errors_figure, position_errors_figure
+from app.figures.style import WIDE_PX
 from app.report_cells import aligned, count, number
 from app.report_page import Cell, Heading, Page, Plot, Section, ShownTable, page_html
 from core.end_effector import judged_points
+from core.pose_loop import pose_loop
 from core.repeatability import DistanceAccuracy, RepeatedPose, distance_accuracy, repeated_poses
 from core.verification import Errors, ModelErrors, Verification, calibrated_verdict, verdicts
 from core.version import VERSION
@@ -22,6 +24,10 @@ METHOD = (
     "Both models stand on the base frame that the calibration found. Position error: the distance between the measured "
     "and the predicted origin of the tool. Orientation error: the angle of the rotation between them. Both contain "
     "what the arm does differently on every visit; their uncertainties are those of the measurement.",
+)
+LOOP = (
+    "A pose is wanted where the nominal arm would have the tool for some commands. Sent as they are, these show what "
+    "the arm misses without a calibration; the compensated commands show what is left with it.",
 )
 TERMS = (
     ("AP", "Pose accuracy (ISO 9283): from the mean of repeated visits to where the model has the pose."),
@@ -45,6 +51,7 @@ def verification_page(found: Verification) -> Page:
     campaign = found.campaign
     sections = (
         _errors(found),
+        _loop(found),
         _poses(found),
         _iso(found),
         Section("method", "Method", METHOD, terms=TERMS),
@@ -137,6 +144,24 @@ def _summary_table(found: Verification) -> ShownTable:
 def _summary_row(name: str, model: str, errors: Errors, scale: float) -> list[Cell]:
     values = (errors.mean, errors.mean_std, errors.rms, errors.p95, errors.max)
     return [Cell(name), Cell(model), *(number(v * scale) for v in values), count(errors.count)]
+
+
+def _loop(found: Verification) -> Section | None:
+    """Poses that were commanded compensated, beside the same by nominal commands."""
+    loop = pose_loop(found)
+    if not loop.compensated.count:
+        return None
+    figures = loop_figures(loop, tuple(range(1, len(loop.wanted) + 1)), WIDE_PX)
+    plots = tuple(Plot(figure, "Measured less wanted pose; bars are ±2 standard uncertainties.") for figure in figures)
+    headings = [Heading("error"), Heading("command")]
+    headings += [Heading(t, numeric=True) for t in ("mean", "u of mean", "rms", "p95", "max", "n")]
+    both = (("nominal", loop.nominal), ("compensated", loop.compensated))
+    groups = [
+        [_summary_row(words, name, getattr(attempts.errors, kind), 1e3) for name, attempts in both if attempts.count]
+        for kind, words in (("position", "position, mm"), ("orientation", "orientation, mrad"))
+    ]
+    table = ShownTable("Wanted poses: commanded, measured, compared", tuple(headings), aligned(groups))
+    return Section("loop", "Compensated commands", LOOP, plots=plots, tables=(table,))
 
 
 def _poses(found: Verification) -> Section:

@@ -4,6 +4,7 @@ import numpy as np
 
 from core.geometry import Array
 from core.json_values import Json, json_text, mm, number, numbers
+from core.pose_loop import PoseLoop, pose_loop
 from core.repeatability import DistanceAccuracy, RepeatedPose, distance_accuracy, repeated_poses
 from core.verification import Errors, Verification, overall, verdicts
 from core.version import VERSION
@@ -28,6 +29,7 @@ def verification_to_json(found: Verification) -> str:
             "summary": _summary(found),
             "improvement_position": number(found.improvement_position),
             "improvement_orientation": number(found.improvement_orientation),
+            "compensation": _loop_record(pose_loop(found)),
             "limits": _limits_record(found),
             "distances": {
                 "nominal": _distance_record(distance_accuracy(found, found.nominal)),
@@ -83,17 +85,52 @@ def _pose_records(found: Verification) -> list[Json]:
 
 
 def _summary(found: Verification) -> Json:
-    out: Json = {}
-    for name, (errors, scale) in quantities(found).items():
-        out[name] = {
-            "mean": number(errors.mean * scale),
-            "rms": number(errors.rms * scale),
-            "p95": number(errors.p95 * scale),
-            "max": number(errors.max * scale),
-            "n": errors.count,
-            "mean_std": number(errors.mean_std * scale),
-        }
-    return out
+    return {name: _statistics(errors, scale) for name, (errors, scale) in quantities(found).items()}
+
+
+def _statistics(errors: Errors, scale: float) -> Json:
+    return {
+        "mean": number(errors.mean * scale),
+        "rms": number(errors.rms * scale),
+        "p95": number(errors.p95 * scale),
+        "max": number(errors.max * scale),
+        "n": errors.count,
+        "mean_std": number(errors.mean_std * scale),
+    }
+
+
+def _loop_record(loop: PoseLoop) -> Json | None:
+    """Wanted poses and what came of them, by nominal and by compensated commands; null without the latter."""
+    if not loop.compensated.count:
+        return None
+    both = (("nominal", loop.nominal), ("compensated", loop.compensated))
+    pose = loop.found.measured.seen.pose
+    return {
+        "visits": [
+            {
+                "pose": int(pose[attempts.row[k]]),
+                "wanted": int(attempts.goal[k]) + 1,
+                "command": name,
+                "position_mm": mm(attempts.errors.position.value[k]),
+                "orientation_rad": number(attempts.errors.orientation.value[k]),
+                "std": {
+                    "position_mm": mm(attempts.errors.position.std[k]),
+                    "orientation_rad": number(attempts.errors.orientation.std[k]),
+                },
+            }
+            for name, attempts in both
+            for k in range(attempts.count)
+        ],
+        "summary": {
+            name: {
+                "position_mm": _statistics(attempts.errors.position, 1e3),
+                "orientation_rad": _statistics(attempts.errors.orientation, 1.0),
+            }
+            for name, attempts in both
+        },
+        "improvement_position": number(loop.improvement_position),
+        "improvement_orientation": number(loop.improvement_orientation),
+    }
 
 
 def _judged(found: Verification) -> dict[str, tuple[str, ...]]:

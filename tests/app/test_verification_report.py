@@ -96,3 +96,27 @@ def test_very_many_poses_are_thinned_and_the_worst_stay() -> None:
     assert len(table.groups[0]) == 500
     assert "verification.json" in table.note
     assert verification_page(many).sections[2].tables[1].groups[0][0][1].text == "250"
+
+
+def test_compensated_visits_have_a_section_of_their_own() -> None:
+    from test_pose_loop import loop
+
+    assert "loop" not in [section.id for section in verification_page(found()).sections]
+    both = loop(Noise(), Noise())
+    section = next(s for s in verification_page(both.found).sections if s.id == "loop")
+    assert [len(group) for group in section.tables[0].groups] == [2, 2]
+    shown = traces(section.plots[0].figure)
+    np.testing.assert_allclose(
+        np.array(shown["compensated command"].y, dtype=float), both.compensated.errors.position.value * 1e3
+    )
+    assert verification_html(both.found).count('<script type="application/json">') == 4
+
+
+def test_without_orientations_there_is_no_figure_of_them() -> None:
+    from test_partial_poses import seen_only
+
+    few = verify(seen_only(campaign("l6", Noise()), "T1"), arm("l6", Noise()))
+    page = verification_page(few)
+    assert len(page.sections[0].plots) == 1
+    assert "No orientation was measured." in page.summary
+    assert "nan" not in verification_html(few).split("<main>")[1].split("<script")[0]

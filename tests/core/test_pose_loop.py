@@ -1,5 +1,6 @@
 """The loop closed on the twin: what was wanted, commanded, measured; before compensation and after it."""
 
+import json
 from dataclasses import replace
 from functools import cache
 
@@ -16,6 +17,7 @@ from core.rotations import vectors_of_rotations
 from core.twin.campaign import simulate_campaign, truth
 from core.twin.noise import Noise
 from core.verification import verify
+from core.verification_json import verification_to_json
 
 
 def wanted_commands() -> Array:
@@ -95,3 +97,18 @@ def test_without_compensated_visits_there_is_nothing_after() -> None:
     assert np.isnan(found.compensated.errors.position.mean)
     assert len(found.wanted) == 24
     assert len(found.both) == 0
+
+
+def test_the_file_tells_both_ways() -> None:
+    document = json.loads(verification_to_json(loop(Noise(), Noise()).found))
+    told = document["compensation"]
+    assert [(v["wanted"], v["command"]) for v in told["visits"][:2]] == [(1, "nominal"), (2, "nominal")]
+    assert [v["pose"] for v in told["visits"]] == list(range(24))
+    own = [v["position_mm"] for v in told["visits"] if v["command"] == "compensated"]
+    assert told["summary"]["compensated"]["position_mm"]["mean"] == pytest.approx(np.mean(own))
+    means = [told["summary"][name]["position_mm"]["mean"] for name in ("nominal", "compensated")]
+    assert told["improvement_position"] == pytest.approx(means[0] / means[1])
+    assert means[0] > 30
+    assert means[1] < 3
+    plain = replace(campaign_of_both(), measurements=replace(campaign_of_both().measurements, wanted=None))
+    assert json.loads(verification_to_json(verify(plain, arm())))["compensation"] is None
