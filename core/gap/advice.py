@@ -4,8 +4,8 @@ For two rivals e and f and a block of points that could be measured, the noncent
 
     lambda = b' (H_ee - H_ef H_ff^-1 H_fe) b
 
-with the sums of columns of data and block together (placement and geometry taken out, b the estimate of e) says how many
-squared standard deviations would then lie between them (T-optimality; Atkinson and Fedorov 1975, doi
+with the sums of columns of data and block together (placement and geometry taken out, b the estimate of e) says how
+many squared standard deviations would then lie between them (T-optimality; Atkinson and Fedorov 1975, doi
 10.1093/biomet/62.1.57).
 """
 

@@ -123,7 +123,8 @@ class Findings:
     def judge(self) -> Judge:
         a = self.analysis
         floor = float(np.mean(a.noise.floor_m2))
-        return Judge(a.problem, a.evidence, self.fold, a.geometry_prior, a.threshold, floor, a.found.chosen, a.found.worth, a.given)
+        prior, found = a.geometry_prior, a.found
+        return Judge(a.problem, a.evidence, self.fold, prior, a.threshold, floor, found.chosen, found.worth, a.given)
 
     @cached_property
     def floor_m2(self) -> float:

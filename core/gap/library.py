@@ -56,7 +56,7 @@ def candidates(doings: Doings, without: frozenset[str] = frozenset()) -> list[Ca
 
 
 def _of_joints_alone(doings: Doings) -> list[Candidate]:
-    """Where a motor also moves the next joint, its faults may still sit behind the branching and stay with one joint."""
+    """Where a motor also moves the next joint, a fault may sit behind the branching and stay with one joint."""
     gains = doings.seen.chain.coupling_gains
     if not gains.any():
         return []

@@ -19,7 +19,7 @@ class Loads:
     """At every joint's origin, in the frame that moves with it, (m, n, 3), N m."""
     joint_kilogram: Array
     joint_offset: Array
-    """Moment about every joint's axis of one kilogram moved by one metre along x, y or z of the last frame, (m, n, 3)."""
+    """Moment about each joint's axis of one kilogram moved by one metre along each axis of the last frame, (m, n, 3)."""
     force_own: Array
     """Weight beyond every joint in the frame that moves with it, (m, n, 3), N."""
     force_kilogram: Array
@@ -70,7 +70,7 @@ def loads(robot: Robot, net: Array) -> Loads | None:
 
 
 def _turning(frames: Array, down: Array) -> Array:
-    """Moment of one kilogram moved by one metre along each axis of the last frame, in the base frame, (m, 3, offset 3)."""
+    """Moment of one kilogram moved by one metre along each axis of the last frame, base frame, (m, 3, offset 3)."""
     along = np.swapaxes(frames[:, -2, :3, :3], 1, 2)
     return np.swapaxes(cross(along, down), 1, 2)
 

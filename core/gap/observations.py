@@ -98,7 +98,7 @@ class Observations:
 
     @cached_property
     def time(self) -> Array:
-        """Time since the first point as a share of the whole, 0..1, (m,); the order of measurement where none was logged."""
+        """Time since the first point as a share of the whole, 0..1, (m,); without times the order of measurement."""
         logged = self.campaign.measurements.time_s
         time = self.record.astype(float) if logged is None else logged[self.rows]
         if not np.isfinite(time).all() or np.ptp(time) == 0:

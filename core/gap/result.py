@@ -169,7 +169,7 @@ class LeftTest:
 
 @dataclass(frozen=True)
 class Cell:
-    """One square of the map cause by joint: how strongly the data speak for an effect at a place when it stands alone."""
+    """One square of the map cause by joint: how strongly the data speak for an effect at a place alone."""
 
     place: Place
     evidence: float

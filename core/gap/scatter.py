@@ -1,4 +1,4 @@
-"""Errors that do not repeat: at one joint (play or friction that nobody logged), at all (steps of encoders), or nowhere."""
+"""Errors that do not repeat: at one joint (play or friction that nobody logged), or nowhere in particular."""
 
 import numpy as np
 

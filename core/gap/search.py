@@ -1,4 +1,4 @@
-"""Which few named candidates together account for the residuals: one after the other, each reconsidered given the rest."""
+"""Which few named candidates account for the residuals: one after the other, each reconsidered given the rest."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ class Found:
 
     chosen: Chosen
     alone: Array
-    """Log evidence of each searched candidate standing alone, less the cost of choosing, by candidate; -inf: not searched."""
+    """Log evidence of each candidate standing alone, less the cost of choosing, by candidate; -inf: not searched."""
     alone_size: Array
     worth: Chosen
     """Those of them that are more than an imperfection of a stronger one."""

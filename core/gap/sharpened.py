@@ -1,4 +1,4 @@
-"""What a grid of candidates finds only roughly, found sharply: the order of a mesh, the moment of a shift, encoder steps."""
+"""What a grid of candidates finds roughly, found sharply: the order of a mesh, the moment of a shift, encoder steps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -20,7 +20,7 @@ def warnings_of(doings: Doings, noise: NoiseFound) -> tuple[str, ...]:
         out.append(f"Only validation rows show {', '.join(lost)}, whose place is not known: they were left out.")
     if noise.source != "replicates":
         out.append(
-            "Nothing was measured twice: the noise is estimated from what a flexible fit leaves, and errors that do not "
+            "Nothing was measured twice: the noise is estimated from what a flexible fit leaves; errors that do not "
             "repeat cannot be told from it."
         )
     if not doings.past.complete:

@@ -52,7 +52,7 @@ def flexures(doings: Doings) -> list[Candidate]:
 
 
 def payloads(doings: Doings) -> list[Candidate]:
-    """The drives give under a mass at the tool that the sim does not carry: one that was logged, or one always there."""
+    """The drives give under a mass at the tool that the sim does not carry: logged, or always there."""
     per_kg = doings.kilogram_load
     if per_kg is None:
         return []
@@ -74,7 +74,7 @@ def _loaded_off_centre(doings: Doings, joint: int) -> bool:
 
 
 def _generous_compliance(doings: Doings, joint: int) -> Candidate:
-    """The same where masses and the payload's centre are not quite those that are written down, or the drive stiffens."""
+    """The same where masses and the payload's centre are known roughly only, or the drive stiffens."""
     plain = _compliance(doings, joint, "torque from weights that are roughly known", _from_weights(joint))
     off = NEAR_M * doings.seen.payload_kg[:, None] * doings.offset_load[:, joint]
     largest = max(ANGLE / plain.reference[0], float(np.abs(off).max()))
