@@ -235,12 +235,17 @@ def _share(outcomes: list[bool]) -> Share:
 
 def _top_one(cases: list[Case]) -> TopOne:
     first = [(case, _first(case)) for case in cases]
-    joints = [(c, {a.joint for a in case.answers if a.joint}) for case, c in first]
+    placed = [(case, c, {a.joint for a in case.answers if a.joint}) for case, c in first]
     return TopOne(
         exact=_share([c is not None and _meets(c, case.answers, False) for case, c in first]),
         up_to_class=_share([c is not None and _meets(c, case.answers, True) for case, c in first]),
-        joint=_share([c is not None and c.place.joint in wanted for c, wanted in joints if wanted]),
+        joint=_share([c is not None and _at_joint(c, case, joints) for case, c, joints in placed if joints]),
     )
+
+
+def _at_joint(cause: SaidCause, case: Case, joints: set[int]) -> bool:
+    """Whether a cause sits at one of the joints, or is right and sits at none."""
+    return cause.place.joint in joints or (cause.place.joint is None and _meets(cause, case.answers, False))
 
 
 def _sets(cases: list[Case]) -> SetMeasures:

@@ -52,6 +52,16 @@ def test_one_effect_is_right_by_name_by_class_or_by_joint_only() -> None:
     assert found.wrong_names.share == pytest.approx(2 / 5)
 
 
+def test_a_right_cause_without_a_joint_is_no_wrong_joint() -> None:
+    there = (*one("ratio", joint=2), *one("scale"))
+    found = scored(
+        (said("a", cause(Place("scale"))), there),
+        (said("b", cause(RATIO_2)), there),
+        (said("c", cause(BACKLASH_3)), there),
+    )
+    assert (found.mixture.joint.count, found.mixture.joint.of) == (2, 3)
+
+
 def test_only_the_strongest_cause_counts_for_the_first() -> None:
     found = scored((said("a", cause(RATIO_2), cause(BACKLASH_3)), one("backlash", joint=3)))
     assert found.single.exact.count == 0
