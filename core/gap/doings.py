@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from core.gap.history import History, drive_load, history
+from core.gap.history import History, drive_load, history, motors_of
 from core.gap.loads import Loads, loads
 from core.gap.observations import Observations
 from core.geometry import Array
@@ -93,6 +93,12 @@ class Doings:
             return None
         here = values[self.seen.rows]
         return here if np.isfinite(here).all() else None
+
+    @cached_property
+    def speed(self) -> Array | None:
+        """How fast each motor went, rad/s or m/s, (m, n); None: nobody logged it."""
+        logged = self.logged("speed")
+        return None if logged is None else motors_of(self.seen, logged)
 
     @cached_property
     def elapsed_s(self) -> Array | None:

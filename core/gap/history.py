@@ -99,7 +99,7 @@ def history(seen: Observations) -> History:
     kg = np.zeros(len(order)) if table.payload_kg is None else np.nan_to_num(table.payload_kg[order], nan=-1.0)
     known = np.where(kg >= 0, np.arange(len(kg)), 0)
     return History(
-        active=_displacements(seen, table.commanded[order]),
+        active=motors_of(seen, table.commanded[order]),
         payload_kg=np.maximum(kg[np.maximum.accumulate(known)], 0.0),
         logged_sense=table.approach[order],
         last=place[seen.rows],
@@ -108,8 +108,8 @@ def history(seen: Observations) -> History:
     )
 
 
-def _displacements(seen: Observations, commanded: Array) -> Array:
-    """What each motor was asked for; of an arm seen without couplings: what each joint was."""
+def motors_of(seen: Observations, commanded: Array) -> Array:
+    """What commands, or their rates, ask of each motor, (w, n); of an arm seen without couplings: of each joint."""
     robot = seen.campaign.robot
     active = active_commands(robot, commanded)
     if seen.chain.couplings or not robot.couplings:

@@ -169,27 +169,26 @@ def quantisation(doings: Doings, steps: dict[int, tuple[float, float]]) -> Encod
 
 
 def latencies(doings: Doings) -> list[Candidate]:
-    """An error along the speed, of one joint or of all by one delay; or values read back beside the commanded ones."""
-    out = []
-    speed = doings.logged("speed")
-    if speed is not None:
-        moving = [j for j in motors(doings) if np.ptp(speed[:, j]) > 0]
-        out += [_latency(j, [j]) for j in moving]
-        if len(moving) > 1:
-            out.append(_latency(None, moving))
-    readback = doings.logged("readback")
-    if readback is not None:
-        moving = motors(doings)
-        out += [_read_back(j, [j]) for j in moving] + [_read_back(None, moving)]
-    return out
+    """An error along the speed, of one motor or of all by one delay."""
+    speed = doings.speed
+    if speed is None:
+        return []
+    moving = [j for j in motors(doings) if np.ptp(speed[:, j]) > 0]
+    return [_latency(j, [j]) for j in moving] + ([_latency(None, moving)] if len(moving) > 1 else [])
+
+
+def readings(doings: Doings) -> list[Candidate]:
+    """Values read back beside the commanded ones, of one joint or of all."""
+    if doings.logged("readback") is None:
+        return []
+    moving = motors(doings)
+    return [_read_back(j, [j]) for j in moving] + [_read_back(None, moving)]
 
 
 def _latency(joint: int | None, joints: list[int]) -> Candidate:
     def columns(doings: Doings) -> list[Column]:
-        speed = doings.logged("speed")
-        if speed is None:
-            speed = np.zeros((doings.count, doings.seen.joint_count))
-        return [[(Slot(Part.JOINT, j), -speed[:, j]) for j in joints]]
+        speed = np.zeros_like(doings.active) if doings.speed is None else doings.speed
+        return [[(Slot(Part.DRIVE, j), -speed[:, j]) for j in joints]]
 
     place = Place("latency", joint=None if joint is None else joint + 1)
     return Candidate(place, "along the speed", ("delay_s",), columns, 1, (1e-3,))

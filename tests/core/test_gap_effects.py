@@ -1,0 +1,455 @@
+"""Every candidate against its formula in the contract, applied by core.kinematics to displacements or links."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from gap_arms import ARMS, Day, chain_points, day, net_of_motors
+from scipy.spatial.transform import Rotation
+
+from core.gap.design import Design
+from core.gap.doings import Doings, doings
+from core.gap.effects import drives, instrument
+from core.gap.effects.candidate import Candidate
+from core.gap.library import candidates
+from core.gap.sim import Part, Sim, Slot
+from core.geometry import Array, apply, invert
+from core.kinematics import active_commands, link_frames, nominal_net
+
+TURNING, SLIDING = "coupled", "dh with slides"
+CONTRACT = (
+    "geometry zero_offset ratio eccentricity mesh backlash compliance coupling axis_wobble latency thermal drift "
+    "base_shift target_slip scale hysteresis flexure payload linkage quantisation"
+)
+ALONE = "of the joint alone"
+
+
+@cache
+def world(name: str) -> tuple[Sim, Doings, tuple[Candidate, ...]]:
+    sim = day(ARMS[name](1), 1, Day(arc=7, poses=14))
+    told = doings(sim.seen)
+    return sim, told, tuple(candidates(told))
+
+
+def of(name: str, effect: str, alone: bool = False) -> list[Candidate]:
+    """Candidates of an effect; of motors, or of joints that do not pass it on."""
+    found = [c for c in world(name)[2] if c.place.effect == effect and (ALONE in c.atom) == alone]
+    assert found
+    return found
+
+
+def moved(name: str, candidate: Candidate, numbers: Iterable[float]) -> Array:
+    """The sim with a candidate at some size, composed without approximation."""
+    sim, told, _ = world(name)
+    columns = tuple(candidate.columns(told))
+    return sim.moved_m(Design(sim, columns, np.ones(len(columns))).motions(np.array(list(numbers))))
+
+
+def with_motors(name: str, joint: int, error: Array) -> Array:
+    """The points if a motor (1..n) goes wrong; what it moves through a coupling goes wrong with it."""
+    sim, told, _ = world(name)
+    active = told.active.copy()
+    active[:, joint - 1] += error
+    return chain_points(sim, net_of_motors(sim, active))
+
+
+def with_joint(name: str, joint: int, error: Array) -> Array:
+    """The points if one joint alone goes wrong."""
+    sim, told, _ = world(name)
+    net = told.seen.net.copy()
+    net[:, joint - 1] += error
+    return chain_points(sim, net)
+
+
+def x_of(name: str, joint: int) -> Array:
+    return world(name)[1].active[:, joint - 1]
+
+
+def same(found: Array, expected: Array) -> None:
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_every_effect_of_the_contract_has_candidates_but_steps_that_have_to_be_found() -> None:
+    effects = {c.place.effect for c in (*world(TURNING)[2], *world(SLIDING)[2]) if c.named}
+    assert effects | {"quantisation"} == set(CONTRACT.split())
+
+
+@pytest.mark.parametrize("name", [TURNING, SLIDING, "coupled slide"])
+def test_columns_are_derivatives(name: str) -> None:
+    """Of every candidate, by a small number of each unknown on its own."""
+    sim, told, library = world(name)
+    step = 1e-6
+    for candidate in library:
+        columns = tuple(candidate.columns(told))
+        assert len(columns) == len(candidate.names), candidate.place
+        design = Design(sim, columns, np.ones(len(columns)))
+        derivative = design.whole()
+        for k in {0, len(columns) // 2, len(columns) - 1}:
+            numbers = np.zeros(len(columns))
+            numbers[k] = step / max(np.abs(derivative[:, :, k]).max(), 1.0)
+            slope = (sim.moved_m(design.motions(numbers)) - sim.moved_m(design.motions(-numbers))) / (2 * numbers[k])
+            scale = max(np.abs(derivative[:, :, k]).max(), 1.0)
+            np.testing.assert_allclose(derivative[:, :, k] / scale, slope / scale, atol=1e-8, err_msg=str(candidate))
+
+
+@pytest.mark.parametrize("name", [TURNING, SLIDING])
+class TestDrives:
+    def test_zero_offset(self, name: str) -> None:
+        for one in of(name, "zero_offset"):
+            same(moved(name, one, [0.2]), with_motors(name, one.place.joint, np.full(world(name)[1].count, 0.2)))
+
+    def test_ratio(self, name: str) -> None:
+        for one in of(name, "ratio"):
+            same(moved(name, one, [0.1]), with_motors(name, one.place.joint, 0.1 * x_of(name, one.place.joint)))
+
+    @pytest.mark.parametrize("effect", ["eccentricity", "mesh"])
+    def test_periodic_errors(self, name: str, effect: str) -> None:
+        for one in of(name, effect)[::7]:
+            fixed = dict(one.fixed)
+            order = 2 * np.pi / fixed["lead_m"] if "lead_m" in fixed else fixed.get("order_1", 1.0)
+            x = order * x_of(name, one.place.joint)
+            error = 0.02 * np.sin(x) - 0.03 * np.cos(x)
+            same(moved(name, one, [0.02, -0.03]), with_motors(name, one.place.joint, error))
+
+    def test_coupling(self, name: str) -> None:
+        for one in of(name, "coupling"):
+            error = 0.1 * x_of(name, one.place.source)
+            same(moved(name, one, [0.1]), with_joint(name, one.place.joint, error))
+
+    def test_latency_along_the_speed(self, name: str) -> None:
+        """Commands come late, all joints' by the same time: the arm is where its commands were."""
+        sim, told, _ = world(name)
+        late = told.seen.campaign.measurements.commanded[told.seen.rows] - 0.05 * told.logged("speed")
+        everything = next(c for c in of(name, "latency") if c.place.joint is None and c.atom == "along the speed")
+        same(moved(name, everything, [0.05]), chain_points(sim, nominal_net(told.seen.campaign.robot, late)))
+
+    def test_latency_of_one_motor(self, name: str) -> None:
+        _, told, _ = world(name)
+        speed = active_commands(told.seen.campaign.robot, told.logged("speed"))
+        for one in of(name, "latency"):
+            if one.place.joint is not None and one.atom == "along the speed":
+                same(
+                    moved(name, one, [0.05]), with_motors(name, one.place.joint, -0.05 * speed[:, one.place.joint - 1])
+                )
+
+    def test_values_read_back(self, name: str) -> None:
+        _, told, _ = world(name)
+        rows = told.seen.campaign.measurements
+        away = (rows.readback - rows.commanded)[told.seen.rows]
+        for one in of(name, "latency"):
+            if one.place.joint is not None and one.atom == "as read back":
+                same(moved(name, one, [0.8]), with_joint(name, one.place.joint, 0.8 * away[:, one.place.joint - 1]))
+
+    def test_quantisation(self, name: str) -> None:
+        """At a share of one the displacement is whole steps away from its phase."""
+        _, told, _ = world(name)
+        one = drives.quantisation(told, {0: (0.01, 0.0), 2: (0.02, 0.25)})
+        active = told.active.copy()
+        active[:, 0] = 0.01 * np.round(active[:, 0] / 0.01)
+        active[:, 2] = 0.02 * (np.round(active[:, 2] / 0.02 - 0.25) + 0.25)
+        sim = world(name)[0]
+        same(moved(name, one, [1.0]), chain_points(sim, net_of_motors(sim, active)))
+
+    def test_backlash_is_half_the_gap_behind_the_motor(self, name: str) -> None:
+        _, told, _ = world(name)
+        for one in of(name, "backlash"):
+            if one.atom == "taken up by the motor":
+                error = -0.5 * 0.02 * told.sense[:, one.place.joint - 1]
+                same(moved(name, one, [0.02]), with_motors(name, one.place.joint, error))
+
+    def test_backlash_under_gravity_is_half_the_gap_on_the_flank(self, name: str) -> None:
+        _, told, _ = world(name)
+        for one in of(name, "backlash"):
+            if one.atom.startswith("taken up by loads"):
+                flank = told.past.flank(one.place.joint - 1, float(one.atom.split()[5]))
+                found, expected = moved(name, one, [0.02]), with_motors(name, one.place.joint, 0.01 * flank)
+                assert np.mean(np.abs(found - expected).max(axis=1) < 1e-12) > 0.98
+
+    def test_hysteresis(self, name: str) -> None:
+        """A loss of 20 that is 15 less right after a reversal and grows by 5 at full load."""
+        _, told, _ = world(name)
+        for one in of(name, "hysteresis"):
+            j = one.place.joint - 1
+            way = 0.015 if world(name)[0].seen.chain.sliding[j] else 0.15
+            names = [f"not_yet_after_{1e3 * way:g}" in n for n in one.names]
+            numbers = np.where(names, -0.015, 0.0)
+            numbers[0] = 0.02
+            loss = 0.02 - 0.015 * np.exp(-told.travel[:, j] / way)
+            if one.names[-1].startswith("with_load"):
+                numbers[-1] = 0.005
+                loss += 0.005 * np.abs(told.drive_load[:, j]) / np.abs(told.drive_load[:, j]).max()
+            same(moved(name, one, numbers), with_motors(name, one.place.joint, -0.5 * told.sense[:, j] * loss))
+
+    def test_compliance(self, name: str) -> None:
+        _, told, _ = world(name)
+        for one in of(name, "compliance"):
+            load = told.logged("torque_nm") if "reported" in one.atom else told.drive_load
+            numbers = np.zeros(len(one.names))
+            numbers[0] = 3e-4
+            error = 3e-4 * load[:, one.place.joint - 1]
+            same(moved(name, one, numbers), with_motors(name, one.place.joint, error))
+
+    def test_compliance_with_a_payload_beside_the_tool(self, name: str) -> None:
+        """give times payload at an offset: the numbers are give x offset."""
+        _, told, _ = world(name)
+        offset = np.array([0.03, -0.02, 0.05])
+        for one in of(name, "compliance"):
+            if "roughly" in one.atom:
+                j = one.place.joint - 1
+                more = told.seen.payload_kg * (told.offset_load[:, j] @ offset)
+                numbers = np.array([3e-4, 0, 0, *(3e-4 * offset)])
+                same(moved(name, one, numbers), with_motors(name, j + 1, 3e-4 * (told.drive_load[:, j] + more)))
+
+    def test_payload_bends_all_loaded_drives(self, name: str) -> None:
+        sim, told, _ = world(name)
+        for one in of(name, "payload"):
+            if "elsewhere" in one.atom:
+                continue
+            kg = told.seen.payload_kg if "logged" in one.atom else np.ones(told.count)
+            joints = [int(n.split("_")[3]) - 1 for n in one.names]
+            active = told.active.copy()
+            active[:, joints] += 2e-4 * kg[:, None] * told.kilogram_load[:, joints]
+            same(moved(name, one, np.full(len(joints), 2e-4)), chain_points(sim, net_of_motors(sim, active)))
+
+
+def test_what_a_joint_does_alone_is_not_passed_on() -> None:
+    """Joints 1..3 are coupled: the same faults behind the branching, of net displacements."""
+    _, told, _ = world(TURNING)
+    speed = nominal_net(told.seen.campaign.robot, told.logged("speed"))
+    for one in of(TURNING, "latency", alone=True):
+        if one.place.joint is not None:
+            error = -0.05 * speed[:, one.place.joint - 1]
+            same(moved(TURNING, one, [0.05]), with_joint(TURNING, one.place.joint, error))
+    for one in of(TURNING, "ratio", alone=True):
+        error = 0.1 * told.seen.net[:, one.place.joint - 1]
+        same(moved(TURNING, one, [0.1]), with_joint(TURNING, one.place.joint, error))
+    assert {c.place.joint for c in of(TURNING, "ratio", alone=True)} == {1, 2, 3}
+    assert not [c for c in world(SLIDING)[2] if ALONE in c.atom]
+
+
+class TestLinkage:
+    """A four-bar whose lengths are a little off: the loop closed exactly, differentiated, is a sum of the columns."""
+
+    @staticmethod
+    def rocker(crank: Array, bars: Array) -> Array:
+        """Angle of the output crank; lengths: crank, coupler, output crank, ground."""
+        a, b, c, d = bars
+        end = a * np.exp(1j * crank) - d
+        reach = np.abs(end)
+        return np.angle(end) - np.arccos((reach**2 + c**2 - b**2) / (2 * reach * c))
+
+    def test_every_difference_of_lengths_is_described(self) -> None:
+        _, told, _ = world(TURNING)
+        for one in of(TURNING, "linkage"):
+            crank = x_of(TURNING, one.place.joint) + dict(one.fixed)["crank_at_zero_rad"]
+            features = np.stack([column[0][1] for column in one.columns(told)], axis=1)
+            for k in range(4):
+                bars, step = np.array([1.0, 2.5, 1.0, 2.5]), 1e-6 * np.eye(4)[k]
+                slope = (self.rocker(crank, bars + step) - self.rocker(crank, bars - step)) / 2e-6
+                coefficients, *_ = np.linalg.lstsq(features, slope, rcond=None)
+                np.testing.assert_allclose(features @ coefficients, slope, atol=1e-8)
+
+    def test_no_crank_at_its_dead_point(self) -> None:
+        for one in of(TURNING, "linkage"):
+            crank = x_of(TURNING, one.place.joint) + dict(one.fixed)["crank_at_zero_rad"]
+            assert np.sin(crank).min() > 0.1
+
+
+def inserted(name: str, link: int, where: str, motion: Array, beyond: int) -> Array:
+    """The points if everything beyond is moved by 4x4 motions (m, 4, 4) written in a frame of a link (from 0).
+
+    Args:
+        where: ``before`` the joint of that link moved, or ``after``.
+        beyond: links from this one on (1..n) are moved.
+    """
+    sim, told, _ = world(name)
+    seen = sim.seen
+    frames = link_frames(seen.chain, seen.net)
+    after = frames[:, link]
+    before = (
+        frames[:, link - 1] @ seen.chain.link_transforms[link - 1]
+        if link
+        else np.tile(seen.chain.base_transform, (told.count, 1, 1))
+    )
+    frame = sim.base @ (after if where == "after" else before)
+    points = apply(frame @ motion @ invert(frame), sim.points_m())
+    return np.where((seen.link >= beyond)[:, None], points, sim.points_m())
+
+
+def turns(vectors: Array, about: Array | None = None) -> Array:
+    out = np.tile(np.eye(4), (len(vectors), 1, 1))
+    out[:, :3, :3] = Rotation.from_rotvec(vectors).as_matrix()
+    if about is not None:
+        out[:, :3, 3] = about - out[:, :3, :3] @ about
+    return out
+
+
+def shifts(vectors: Array) -> Array:
+    out = np.tile(np.eye(4), (len(vectors), 1, 1))
+    out[:, :3, 3] = vectors
+    return out
+
+
+@pytest.mark.parametrize("name", [TURNING, SLIDING])
+class TestStructure:
+    def test_geometry_is_another_link_transform(self, name: str) -> None:
+        """Points on links beyond are where the other chain has them; on the link itself a target has moved."""
+        sim, _, _ = world(name)
+        numbers = np.array([0.02, -0.03, 0.01, 0.02, -0.015])
+        motion = np.eye(4)
+        motion[:3, :3] = Rotation.from_rotvec([0.02, -0.03, 0.0]).as_matrix()
+        motion[:3, 3] = numbers[2:]
+        for one in of(name, "geometry"):
+            transforms = sim.seen.chain.link_transforms.copy()
+            transforms[one.place.frame - 1] = motion @ transforms[one.place.frame - 1]
+            other = replace(sim, seen=replace(sim.seen, chain=replace(sim.seen.chain, link_transforms=transforms)))
+            beyond = sim.seen.link > one.place.frame
+            assert beyond.any()
+            found = moved(name, one, numbers)
+            same(found[beyond], other.points_m()[beyond])
+            below = sim.seen.link < one.place.frame
+            same(found[below], sim.points_m()[below])
+            self.is_a_target_elsewhere(name, found - sim.points_m(), sim.seen.link == one.place.frame)
+
+    @staticmethod
+    def is_a_target_elsewhere(name: str, shift: Array, rows: np.ndarray) -> None:
+        """A shift that is the same in the frame of the link, so that placing an unknown target takes it up."""
+        sim, _, _ = world(name)
+        for target in np.unique(sim.seen.target[rows]):
+            mine = rows & (sim.seen.target == target)
+            fields = sim.fields([Slot(Part.TARGET, int(target), k) for k in range(3)])[mine]
+            local = np.einsum("mck,mc->mk", fields, shift[mine])
+            np.testing.assert_allclose(local, np.tile(local[0], (len(local), 1)), atol=1e-12)
+
+    def test_axis_wobble(self, name: str) -> None:
+        for one in of(name, "axis_wobble"):
+            j = one.place.joint - 1
+            x = x_of(name, j + 1)
+            waves = {"sine": np.sin(x), "cosine": np.cos(x), "sine_of_twice": np.sin(2 * x)}
+            waves["cosine_of_twice"] = np.cos(2 * x)
+            numbers = np.linspace(-0.02, 0.03, len(one.names))
+            vectors = {"tilt": np.zeros((len(x), 3)), "shift": np.zeros((len(x), 3))}
+            for label, number in zip(one.names, numbers, strict=True):
+                kind, _, axis, wave = label.rsplit("_", 1)[0].split("_", 3)
+                vectors[kind][:, "xyz".index(axis)] += number * waves[wave]
+            motion = shifts(vectors["shift"]) @ turns(vectors["tilt"])
+            same(moved(name, one, numbers), inserted(name, j, "before", motion, j + 1))
+
+    def test_flexure_turns_what_lies_beyond_the_middle(self, name: str) -> None:
+        sim, told, _ = world(name)
+        for one in of(name, "flexure"):
+            i = one.place.joint - 1
+            numbers = np.zeros(len(one.names))
+            numbers[:3] = [2e-4, -1e-4, 3e-4]
+            bend = told.middle_moment[:, i] * numbers[:3]
+            middle = sim.seen.chain.link_transforms[i, :3, 3] / 2
+            # Shift and turn are composed one after the other: equal to a turn about the middle for small ones.
+            expected = inserted(name, i, "after", turns(bend, middle), i + 1)
+            size = np.abs(expected - sim.points_m()).max()
+            np.testing.assert_allclose(moved(name, one, numbers), expected, atol=np.abs(bend).max() * size)
+
+    def test_thermal_growth_makes_every_length_longer(self, name: str) -> None:
+        sim, told, _ = world(name)
+        rise = told.logged("arm_temperature_c") - told.logged("arm_temperature_c")[0]
+        one = next(c for c in of(name, "thermal") if c.place.joint is None and "arm" in c.atom)
+        numbers = np.zeros(len(one.names))
+        numbers[0] = 1e-3
+        found = moved(name, one, numbers)
+        last = sim.seen.joint_count
+        for k in np.flatnonzero(sim.seen.link == last)[::9]:
+            transforms = sim.seen.chain.link_transforms.copy()
+            transforms[:-1, :3, 3] *= 1 + 1e-3 * rise[k]
+            chain = replace(sim.seen.chain, link_transforms=transforms)
+            grown = replace(sim, seen=replace(sim.seen.part([k]), chain=chain)).points_m()[0]
+            # The last link's own growth moves its targets; no drawing says how.
+            own = Design(sim, tuple(one.columns(told)[-1:]), np.ones(1)).whole()[k, :, 0] * 1e-3
+            if one.names[-1] != f"growth_of_link_{last}_per_k":
+                own = np.zeros(3)
+            np.testing.assert_allclose(
+                found[k], grown + own, atol=1e-4 * np.abs(grown - sim.points_m()[k]).max() + 1e-9
+            )
+
+    def test_thermal_growth_of_one_link(self, name: str) -> None:
+        sim, told, _ = world(name)
+        air = told.logged("temperature_c")
+        for one in of(name, "thermal"):
+            if one.place.joint is not None and "air" in one.atom:
+                i = one.place.joint - 1
+                step = sim.seen.chain.link_transforms[i, :3, 3]
+                motion = shifts(1e-3 * (air - air[0])[:, None] * step)
+                same(moved(name, one, [1e-3]), inserted(name, i, "after", motion, i + 1))
+
+    def test_warming_up_without_a_thermometer(self, name: str) -> None:
+        _, told, _ = world(name)
+        found = [c for c in of(name, "thermal") if c.place.joint is None and c.atom.startswith("warming")]
+        assert len(found) == 3
+        for one in found:
+            minutes = float(one.atom.split()[3])
+            law = 1 - np.exp(-told.elapsed_s / 60 / minutes)
+            ratio = one.columns(told)[0][0][1][1:] / law[1:]
+            np.testing.assert_allclose(ratio, ratio[-1], rtol=0.02)
+
+
+@pytest.mark.parametrize("name", [TURNING, SLIDING])
+class TestInstrument:
+    def test_scale(self, name: str) -> None:
+        sim, _, _ = world(name)
+        (one,) = of(name, "scale")
+        same(moved(name, one, [0.01]), sim.points_m() + 0.01 * (sim.points_m() - sim.middle_m))
+
+    def test_drift(self, name: str) -> None:
+        sim, told, _ = world(name)
+        even = next(c for c in of(name, "drift") if c.atom == "evenly")
+        numbers = np.array([0.01, 0.0, -0.02, 0.003, 0.001, -0.002])
+        turn = turns(told.seen.time[:, None] * numbers[:3], sim.middle_m)
+        expected = apply(turn, sim.points_m()) + told.seen.time[:, None] * numbers[3:]
+        same(moved(name, even, numbers), expected)
+
+    def test_creep_ends_where_even_drift_does(self, name: str) -> None:
+        _, told, _ = world(name)
+        for one in of(name, "drift"):
+            law = one.columns(told)[0][0][1]
+            assert law[0] == 0
+            assert law[-1] == pytest.approx(1.0)
+            assert np.all(np.diff(law) > 0)
+
+    def test_base_shift_and_target_slip(self, name: str) -> None:
+        sim, told, _ = world(name)
+        record = int(sim.seen.record[told.count // 3])
+        after = sim.seen.record >= record
+        shifted = moved(name, instrument.base_shift(record, 1), [0, 0, 0, 0.1, 0.2, 0.3])
+        same(shifted, sim.points_m() + np.where(after[:, None], [0.1, 0.2, 0.3], 0.0))
+        slipped = moved(name, instrument.target_slip(told, 1, record, 1), [0.01, 0.02, 0.03])
+        target_m = sim.target_m + np.array([0.01, 0.02, 0.03])
+        other = replace(sim, target_m=target_m).points_m()
+        same(slipped, np.where((after & (sim.seen.target == 1))[:, None], other, sim.points_m()))
+
+    def test_moments_are_the_first_records_of_standstills(self, name: str) -> None:
+        _, told, _ = world(name)
+        firsts = set(told.seen.record[np.append(True, np.diff(told.seen.standstill) != 0)])
+        for effect in ("base_shift", "target_slip"):
+            assert {c.place.record for c in of(name, effect)} <= firsts
+
+
+def test_saw_rounds_to_whole_steps() -> None:
+    x = np.random.default_rng(1).uniform(-3, 3, 500)
+    for step, phase in ((0.1, 0.0), (0.03, 0.5), (0.7, 0.2)):
+        teeth = drives.saw(x, step, phase)
+        assert np.abs(teeth).max() <= step / 2 + 1e-12
+        rest = (x + teeth) / step - phase
+        np.testing.assert_allclose(rest, np.round(rest), atol=1e-9)
+
+
+def test_one_cause_is_counted_once_however_many_forms_it_has() -> None:
+    """What choosing costs is at least the number of forms that compete at one place."""
+    for name in (TURNING, SLIDING):
+        forms: dict[object, list[Candidate]] = {}
+        for one in world(name)[2]:
+            place = one.place
+            if one.named:
+                forms.setdefault((place.effect, place.joint, place.source, place.frame, place.target), []).append(one)
+        for key, some in forms.items():
+            if key[0] not in ("compliance", "latency"):
+                assert max(c.choices for c in some) >= len(some) / 2, key
