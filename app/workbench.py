@@ -86,6 +86,7 @@ class Workbench:
         self.previous: Calibration | None = None
         self._ahead = SolveAhead()
         self._listeners: list[Callable[[], None]] = []
+        self._fitted: tuple[State | None, dict[tuple[int, int], SweepSoFar]] = (None, {})
         self._one_shot = threading.Lock()
         self._stop = threading.Event()
         self.running: bool | None = None
@@ -389,8 +390,14 @@ class Workbench:
         return so_far.live, so_far.shots
 
     def so_far(self, joint: int, sweep: int) -> SweepSoFar:
-        """A sweep as far as it is measured."""
-        return sweep_so_far(self.state, joint, sweep)
+        """A sweep as far as it is measured; fitted once as long as nothing changes."""
+        state = self.state
+        if state is not self._fitted[0]:
+            self._fitted = state, {}
+        sweeps = self._fitted[1]
+        if (joint, sweep) not in sweeps:
+            sweeps[joint, sweep] = sweep_so_far(state, joint, sweep)
+        return sweeps[joint, sweep]
 
     def tool_std_m(self, so_far: SweepSoFar) -> float | None:
         """How well the place of a sweep's axis is known at the tool, m; None: there is no axis or no tool yet."""
@@ -406,12 +413,15 @@ class Workbench:
         if self.rig.base is not None:
             return Placement(self.rig.base, True)
         solved = None if self.calibration is None else base_of(self.calibration)
-        return base_so_far(self.state) if solved is None else Placement(solved, True)
+        return base_so_far(self.state, self.so_far) if solved is None else Placement(solved, True)
 
     def expected(self) -> Expected | None:
         """About where the target of the next shot will be; None: not known yet."""
         step, base = self.state.next_step, self.base()
-        return None if step is None else expected_place(self.state, step, base.base if base.settled else None)
+        if step is None:
+            return None
+        so_far = self.so_far(step.joint, step.sweep)
+        return expected_place(self.state, step, so_far, base.base if base.settled else None)
 
     @property
     def standing(self) -> tuple[float, ...]:

@@ -1,5 +1,6 @@
 """What the shots of a session say so far, before anything is solved: axes, where the next target will be seen."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,13 +67,18 @@ def sweep_so_far(state: State, joint: int, sweep: int) -> SweepSoFar:
     return SweepSoFar(joint, sweep, live, tuple(shots))
 
 
-def base_so_far(state: State) -> Placement:
-    """Where the robot's base stands, by the axes of all sweeps so far."""
+def base_so_far(state: State, sweeps: Callable[[int, int], SweepSoFar] | None = None) -> Placement:
+    """Where the robot's base stands, by the axes of all sweeps so far.
+
+    Args:
+        state: of the session.
+        sweeps: gives the sweep of a joint and a number, where somebody keeps them; None: they are fitted.
+    """
     robot = state.robot
     nominal, found, sliding = [], [], []
     if robot is not None:
         for joint, sweep in dict.fromkeys((row.joint, row.sweep) for row in state.plan.sweeps):
-            so_far = sweep_so_far(state, joint, sweep)
+            so_far = sweep_so_far(state, joint, sweep) if sweeps is None else sweeps(joint, sweep)
             if so_far.live.fit is not None:
                 frames = link_frames(robot, _net(state, robot, so_far.shots[0].taken.commanded)[None])[0]
                 axis = frames[joint - 1]
@@ -105,13 +111,13 @@ def base_of(found: Calibration) -> Array | None:
     return geometry.base @ invert(nominal)
 
 
-def expected_place(state: State, step: Step, base: Array | None) -> Expected | None:
+def expected_place(state: State, step: Step, so_far: SweepSoFar, base: Array | None) -> Expected | None:
     """About where the target of a step will be seen; None: it cannot be told yet.
 
     Args:
+        so_far: the sweep of the step.
         base: from the robot's base frame to the instrument's, (4, 4); None: not known.
     """
-    so_far = sweep_so_far(state, step.joint, step.sweep)
     last = next((shot for shot in reversed(so_far.shots) if shot.taken.target == step.target), None)
     if so_far.live.fit is not None and last is not None:
         way = step.commanded[step.joint - 1] - last.taken.commanded[step.joint - 1]

@@ -60,7 +60,7 @@ def test_the_next_target_is_expected_by_the_arm_then_by_its_own_sweep(session: S
     errors = []
     for k in range(len(session.state.steps)):
         step = session.state.next_step
-        expected = expected_place(session.state, step, TRUE_BASE)
+        expected = expected_place(session.state, step, sweep_so_far(session.state, step.joint, step.sweep), TRUE_BASE)
         take(session, 1)
         if expected is not None:
             seen = np.array(session.state.shots[-1].taken.point_m)
@@ -76,8 +76,9 @@ def test_nothing_is_expected_of_a_target_that_nobody_has_seen(session: Session) 
     go_to(session, 3)
     step = session.state.next_step
     assert step.target == "T3"
-    assert expected_place(session.state, step, TRUE_BASE) is None
-    assert expected_place(session.state, session.state.steps[0], None) is None
+    state, first = session.state, session.state.steps[0]
+    assert expected_place(state, step, sweep_so_far(state, 3, 1), TRUE_BASE) is None
+    assert expected_place(state, first, sweep_so_far(state, 6, 1), None) is None
 
 
 def test_the_axis_is_less_well_known_at_a_far_tool(session: Session) -> None:
