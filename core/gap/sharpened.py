@@ -36,7 +36,9 @@ def sharpened(
     for candidate, own in zip(chosen, own_m, strict=True):
         place = candidate.place
         if place.effect == "mesh" and place.joint is not None and not doings.seen.chain.sliding[place.joint - 1]:
-            out.append(_mesh(sim, doings, place.joint - 1, candidate, left_m + own, weight))
+            # Between two orders of the grid both are chosen: each is found anew without the other.
+            near = [part for one, part in zip(chosen, own_m, strict=True) if _neighbours(doings, one, candidate)]
+            out.append(_mesh(sim, doings, place.joint - 1, candidate, left_m + sum(near), weight))
         elif place.effect == "base_shift":
             out.append(_shift(sim, doings, place.record, left_m + own, weight, None))
         elif place.effect == "target_slip":
@@ -158,9 +160,21 @@ def _alike_near(spectra: list[Spectrum], step: float) -> tuple[float, dict[int, 
     return best[0], {spectrum.joint: (best[1], spectrum.best_phase(best[1])[1]) for spectrum in spectra}
 
 
+def _neighbours(doings: Doings, one: Candidate, other: Candidate) -> bool:
+    """Whether two mesh errors are one that lies between orders of the grid, or the same."""
+    if not one.place.same_as(other.place):
+        return False
+    apart = abs(dict(one.fixed)["order_1"] - dict(other.fixed)["order_1"])
+    return apart < 1.5 * _order_step(doings, other.place.joint - 1)
+
+
+def _order_step(doings: Doings, joint: int) -> float:
+    return max(drives.FINEST_ORDER_STEP, np.pi / (2.5 * max(doings.seen.span[joint], 1e-6)))
+
+
 def _mesh(sim: Sim, doings: Doings, joint: int, candidate: Candidate, aim_m: Array, weight: Array) -> Candidate:
     order = dict(candidate.fixed)["order_1"]
-    step = max(drives.FINEST_ORDER_STEP, np.pi / (2.5 * max(doings.seen.span[joint], 1e-6)))
+    step = _order_step(doings, joint)
     field = sim.fields([Slot(Part.DRIVE, joint)])[:, :, 0]
     x = doings.active[:, joint]
     orders = order + step * np.linspace(-1.0, 1.0, FINER)
