@@ -4,7 +4,7 @@ import threading
 
 import numpy as np
 
-from app.scene.axes import AxesView, AxisMark
+from app.scene.axes import AxesView, AxisMark, tube_exaggeration
 from app.scene.cameras import Camera, presets
 from app.scene.colours import GHOST, ResidualScale
 from app.scene.diagnosis import DiagnosisView
@@ -24,6 +24,8 @@ from core.geometry import Array
 from core.robot import Joint
 
 BLUE = (0, 114, 178)
+AXIS_OF_REACH, TUBE_OF_REACH = 0.4, 0.02
+"""Length of the axes that are drawn, and greatest radius of their tubes, as shares of the arm's reach."""
 GHOST_SWELL_M = 0.01
 """The ghost is that much thicker, so that it does not flicker with the arm inside it."""
 SEEN_MOVING_M = 1e-3
@@ -51,6 +53,8 @@ class CellView:
         """Where the arms are drawn."""
         self.drawn: Calibration | None = None
         """The calibration that is shown."""
+        self.tube_exaggeration = 1.0
+        """How many times too wide the tubes of uncertainty about the axes are."""
         self.scale = ResidualScale(1e-3)
         """Colours of residuals since the last solution."""
         self.shown_shots: tuple[int, ...] = ()
@@ -85,6 +89,16 @@ class CellView:
             view.remove()
         self._draw_arms()
         self.ghost.visible = ghost
+
+    def refresh(self) -> None:
+        """Show what the workbench has now."""
+        found = self._bench.calibration
+        if found is None:
+            self.forget()
+        elif found is not self.drawn:
+            self.show_calibration(found)
+        self.show_shots()
+        self.follow_robot()
 
     def cameras(self) -> tuple[Camera, ...]:
         """Where to look from, for the arm as it stands."""
@@ -136,8 +150,7 @@ class CellView:
         geometry = found.estimate.geometry
         if geometry is not None and found.nominal is not None:
             self._exaggeration = fitting_exaggeration(found.nominal, geometry, self.arm.bones.reach_m)
-        marks = axis_marks(found.estimate)
-        self._axes = AxesView(self._viewer, "/axes", marks, self._bench.nominal.sliding, length_m=0.7)
+        self._show_axes(found.estimate)
         residuals = found.refinement.residuals
         measured = found.campaign.measurements.point_m[residuals.row]
         self.errors.show(measured, measured - residuals.residual_m)
@@ -145,8 +158,17 @@ class CellView:
             self._diagnosis.remove()
             self._diagnosis = None
         self.diagnose(self._diagnosed)
-        self.show_shots()
-        self.follow_robot()
+
+    def _show_axes(self, estimate: ArmEstimate) -> None:
+        reach = self.arm.bones.reach_m
+        marks, length = axis_marks(estimate, self.arm.bones.hubs_m), AXIS_OF_REACH * reach
+        self.tube_exaggeration = tube_exaggeration(marks, length, TUBE_OF_REACH * reach)
+        if self._axes is not None:
+            self._axes.place(marks, self.tube_exaggeration)
+            return
+        sliding = self._bench.nominal.sliding
+        look = {"radius_m": 0.0022 * reach, "exaggeration": self.tube_exaggeration}
+        self._axes = AxesView(self._viewer, "/axes", marks, sliding, length, **look)
 
     def forget(self) -> None:
         """Take away what a solution has drawn."""
@@ -220,12 +242,12 @@ class CellView:
         return self.scale.colours(np.array([radial.get(record, np.nan) for record in records]))
 
 
-def axis_marks(estimate: ArmEstimate) -> tuple[AxisMark, ...]:
-    """The calibrated axes as the scene takes them."""
+def axis_marks(estimate: ArmEstimate, hubs_m: Array) -> tuple[AxisMark, ...]:
+    """The calibrated axes as the scene takes them; ``hubs_m``: where the joints are drawn, (n, 3)."""
     marks = []
     for joint, line in enumerate(estimate.arm.axes, 1):
         direction_std, place_std = estimate.axis_std(joint)
-        marks.append(AxisMark(joint, line, line.point_m, direction_std, place_std, text=f"axis {joint}"))
+        marks.append(AxisMark(joint, line, hubs_m[joint - 1], direction_std, place_std, text=f"axis {joint}"))
     return tuple(marks)
 
 

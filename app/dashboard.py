@@ -141,19 +141,14 @@ class Dashboard:
 
     def _show_all(self) -> None:
         with self.server.atomic():
-            if self.bench.calibration is None:
-                self.cell.forget()
-            self.cell.show_shots()
-            self.cell.follow_robot()
+            # All at once: every batch of messages costs the browser a picture of the scene.
+            self.cell.refresh()
             self.start.refresh()
             self.check.refresh()
             self.acquire.refresh()
             self.solve.refresh()
             self.export.refresh()
-            # All at once: every batch of messages costs the browser a picture of the scene.
             self.results.refresh()
-            if self.bench.calibration is not None and self.bench.calibration is not self.cell.drawn:
-                self.cell.show_calibration(self.bench.calibration)
             self.verify.refresh()
             self.gap.refresh()
             self.view.refresh()

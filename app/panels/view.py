@@ -76,6 +76,10 @@ class ViewPanel:
                 for step in self._cell.scale.legend()
             )
             words = f"<h3>Radial residual of a shot</h3><p>{steps}</p>"
+            words += (
+                "<p class='soft'>Tubes about the axes: one standard uncertainty, drawn "
+                f"{self._cell.tube_exaggeration:g} times too wide.</p>"
+            )
         self._legend.content = block(words, "legend")
         self._swell.value = int(self._cell.exaggeration)
         for slider, value, scale in zip(self._sliders, self._cell.commanded, self._scales, strict=True):

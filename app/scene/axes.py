@@ -108,6 +108,18 @@ class AxesView(SceneGroup):
         self._tubes: list[viser.MeshHandle] = []
         self._draw_tubes()
 
+    def place(self, marks: tuple[AxisMark, ...], exaggeration: float) -> None:
+        """Draw the same joints' axes as they are known now: shapes are changed, not drawn anew."""
+        self._marks, self._exaggeration = tuple(marks), exaggeration
+        with self._together():
+            self.highlight(None)
+            for node, shaft, mark in zip(self._nodes, self._shafts, self._marks, strict=True):
+                node.position = mark.middle_m
+                shaft.vertices = self._shaft(mark, self._radius).vertices_m.astype(np.float32)
+            for label, mark in zip(self._labels, [m for m in self._marks if m.text], strict=True):
+                label.position = self._tip(mark)
+            self._draw_tubes()
+
     def show(self, net: ArrayLike) -> None:
         """Move the axes to where joints at net displacements (n,) bring them."""
         motions = link_motions(tuple(m.line for m in self._marks), self._sliding, net)
@@ -119,7 +131,7 @@ class AxesView(SceneGroup):
     def highlight(self, joint: int | None) -> None:
         """Draw one axis, 1..n, thick and in the colour of attention, and the others as usual; None: none."""
         with self._together():
-            for old in {self._lit, joint} - {None}:
+            for old in {self._lit, joint} - {None} if joint != self._lit else ():
                 lit = old == joint
                 colour, radius = (HIGHLIGHT, 2.0 * self._radius) if lit else (self._colour, self._radius)
                 self._shafts[old - 1] = self._arrow(self._marks[old - 1], colour, radius)
@@ -149,16 +161,24 @@ class AxesView(SceneGroup):
         return add_frame(self._scene, f"{self._root}/{mark.joint}", mark.middle_m)
 
     def _arrow(self, mark: AxisMark, colour: Rgb, radius_m: float) -> "viser.MeshHandle":
-        solid = axis_arrow(mark, self._length, radius_m).about(mark.middle_m)
-        return self._mesh(mark, "arrow", solid, colour, None)
+        return self._mesh(mark, "arrow", self._shaft(mark, radius_m), colour, None)
+
+    def _shaft(self, mark: AxisMark, radius_m: float) -> Solid:
+        return axis_arrow(mark, self._length, radius_m).about(mark.middle_m)
+
+    def _tip(self, mark: AxisMark) -> Array:
+        """Where the label stands, from the node of the axis."""
+        return axis_ends(mark, self._length)[1] - mark.middle_m
 
     def _label(self, mark: AxisMark) -> "viser.LabelHandle":
-        tip = axis_ends(mark, self._length)[1] - mark.middle_m
-        name = f"{self._root}/{mark.joint}/label"
+        name, tip = f"{self._root}/{mark.joint}/label", self._tip(mark)
         return self._scene.add_label(name, mark.text, position=tip, anchor="bottom-center", font_screen_scale=1.05)
 
     def _draw_tubes(self) -> None:
         solids = [(mark, uncertainty_tube(mark, self._length, self._exaggeration)) for mark in self._marks]
+        if sum(solid is not None for _, solid in solids) < len(self._tubes):
+            for tube in self._tubes:
+                tube.remove()
         self._tubes = [
             self._mesh(mark, "tube", solid.about(mark.middle_m), self._colour, TUBE_OPACITY)
             for mark, solid in solids
