@@ -29,8 +29,6 @@ from core.twin.own_robot import own_cell
 
 SETTING = "points_from"
 """Key of the session's setting that names the source."""
-NO_ROBOT = Robot("no robot", (Joint(JointKind.REVOLUTE),), np.eye(4)[None])
-"""Stands in for a robot that is lost in a damaged session, so that what is intact can be looked at."""
 
 
 class Source(StrEnum):
@@ -49,7 +47,7 @@ class Rig:
     driver: RobotDriver
     meter: PointMeter
     robot: Robot
-    """The nominal one; ``NO_ROBOT`` where the session has none."""
+    """The nominal one; a stand-in where the session has none."""
     stations: tuple[tuple[str, Array], ...]
     """Names and places of the instrument's stations, (3,) each, in its own frame."""
     cell: Cell | None
@@ -147,9 +145,18 @@ def _by_hand(state: State) -> Rig:
 
 def _readable(state: State) -> Robot:
     try:
-        return state.robot or NO_ROBOT
+        if state.robot is not None:
+            return state.robot
     except InputError:
-        return NO_ROBOT
+        pass
+    commands = [state.plan.home or (), *(shot.taken.commanded for shot in state.shots[:1])]
+    return no_robot(max([1, *map(len, commands), *(row.joint for row in state.plan.sweeps)]))
+
+
+@lru_cache(maxsize=8)
+def no_robot(joints: int) -> Robot:
+    """Stands in for a robot that is lost in a damaged session, so that what is intact can be looked at."""
+    return Robot("no robot", (Joint(JointKind.REVOLUTE),) * joints, np.tile(np.eye(4), (joints, 1, 1)))
 
 
 def _stations(cell: Cell) -> tuple[tuple[str, Array], ...]:

@@ -57,8 +57,8 @@ class TargetEntryPanel:
         self._list.content = targets_words(self._bench.state)
 
     def _act(self, event: object) -> None:
-        asked, name, link = self._do.value, self._name.value.strip(), self._link.value
-        place = self._place.value
+        asked, name, link = self._do.value, str(self._name.value).strip(), self._link.value
+        place = str(self._place.value)
 
         def job(client: object) -> None:
             state = self._bench.state
@@ -100,7 +100,7 @@ class InstrumentEntry:
         self._source.value = next(name for name, source in SOURCES.items() if source is self._bench.rig.source)
 
     def _keep(self, event: object) -> None:
-        kind, text, source = self._kind.value, self._sigma.value, SOURCES.get(self._source.value)
+        kind, text, source = self._kind.value, str(self._sigma.value), SOURCES.get(self._source.value)
 
         def job(client: object) -> None:
             state = self._bench.state
@@ -180,7 +180,8 @@ class SweepEntry:
     def _act(self, event: object) -> None:
         asked, chosen = self._do.value, self._which.value
         joint, ends = self._joint.value, (self._from.value, self._to.value)
-        stops, names, both, held = self._stops.value, self._targets.value, self._both.value, self._held.value
+        stops, both = self._stops.value, self._both.value
+        names, held = str(self._targets.value), str(self._held.value)
 
         def job(client: object) -> None:
             state = self._bench.state
@@ -218,7 +219,7 @@ class SweepEntry:
         return ends[0] / scale, ends[1] / scale
 
     def _keep_home(self, event: object) -> None:
-        text = self._home.value
+        text = str(self._home.value)
 
         def job(client: object) -> None:
             home = commands_of_text(self._bench.nominal, text, "home")

@@ -93,7 +93,7 @@ class NewSession:
         return self._tray.robot(_link(self._base), _link(self._tip))
 
     def _begin(self, event: object) -> None:
-        asked, points, title = self._robot.value, self._points.value, self._title.value.strip()
+        asked, points, title = self._robot.value, self._points.value, str(self._title.value).strip()
         base, tip = _link(self._base), _link(self._tip)
 
         def job(client: object) -> None:

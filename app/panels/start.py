@@ -62,9 +62,9 @@ class StartPanel:
             box.value = f"{state.settings[key]:g}" if key in state.settings else ""
 
     def _keep(self, event: "viser.GuiEvent") -> None:
-        who, title = self._who.value.strip(), self._title.value.strip()
-        facts = {name: box.value.strip() for name, box in self._facts.items()}
-        conditions = {key: box.value for key, box in self._conditions.items()}
+        who, title = str(self._who.value).strip(), str(self._title.value).strip()
+        facts = {name: str(box.value).strip() for name, box in self._facts.items()}
+        conditions = {key: str(box.value) for key, box in self._conditions.items()}
 
         def job(client: object) -> None:
             state = self._bench.state

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.rigs import NO_ROBOT, SETTING, Source, key_of, rig_for
+from app.rigs import SETTING, Source, key_of, no_robot, rig_for
 from app.workbench import Workbench
 from core.instruments import InstrumentFailed, MeasureRequest, Reading
 from core.session import Session
@@ -118,7 +118,7 @@ def test_by_hand_a_shot_needs_its_coordinates(tmp_path):
 def test_a_session_without_a_readable_robot_can_still_be_looked_at():
     for state in (State(), State(robot_toml="nonsense")):
         rig = rig_for(state, 1)
-        assert rig.robot is NO_ROBOT
+        assert rig.robot is no_robot(1)
         assert rig.source is Source.BY_HAND
         assert key_of(state).source is Source.BY_HAND
         with pytest.raises(InstrumentFailed):
