@@ -11,7 +11,7 @@ from core.gap.doings import Doings, doings
 from core.gap.effects.candidate import Candidate
 from core.gap.evidence import Chosen, Evidence, joined
 from core.gap.folds import blocks
-from core.gap.kept_out import KNOWN, KeptOut
+from core.gap.kept_out import KeptOut
 from core.gap.library import candidates
 from core.gap.observations import Observations
 from core.gap.placement import place, placement_slots, with_placement
@@ -26,14 +26,14 @@ GEOMETRY_PRIORS = (3e-5, 1e-4)
 """How well a calibrated sim's geometry may be known, rad and m; the data choose."""
 AS_CALIBRATED, UNCALIBRATED = 1e-4, 1e-3
 """Geometry known so well is what a calibration leaves; beyond, it is itself a cause."""
-STRAY, GEOMETRY_CLOSES = 2.5, 0.5
-"""The geometry of a whole sim is off where its numbers stray by so many calibrated sizes, rms, and where letting them
-leaves at most such a part of the kept-out mean square."""
-LEFT_BY_CAUSES = 0.2
-"""Of the kept-out mean square: where other causes leave less, they are the answer."""
+STRAY = 2.5
+"""Calibrated sizes rms by which geometry must stray before a sim is suspected to be as drawn."""
+FAR_LEFT, GEOMETRY_CLOSES = 3.0, 0.6
+"""That is said where causes alone leave so many times the floor, and geometry with causes at most such a part of it."""
 NULL_QUANTILE, NULL_MARGIN = 0.9, 3.0
 """Of the largest evidence that noise alone makes; beyond a quantile it falls off as exp(-x)."""
-MOST_FLEXIBLE = 4
+MOST_FLEXIBLE, MOST_SPENT = 4, 0.08
+"""Nameless functions that a flexible fit takes, none with more columns than such a share of the components."""
 PASSES = 3
 BENT = 0.15
 """Curvature below this share of the noise does not matter."""
@@ -137,7 +137,7 @@ def analyse(
         progress((turn + 0.5) / (PASSES + 1), "searching for causes")
         white = whitening(noise.covariance_m2, noise.weight, noise.memory)
         problem = pose_problem(sim, told_doings, library, aim, white)
-        best = _best_prior(problem)
+        best = _best_prior(problem, float(noise.floor_m2.mean()))
         learnt = _learn(told_doings, problem, best, first, told, steps=turn == 0)
         fresh = [one for one in learnt.sharper if one.place.effect not in without]
         straight = learnt.bent_m2 < BENT**2 * noise.floor_m2.mean()
@@ -201,13 +201,16 @@ def _rescaled(covariance: Array, variance: float) -> Array:
     return covariance + extra * np.eye(3)
 
 
-def _best_prior(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
+def _best_prior(problem: Problem, floor_m2: float) -> tuple[Evidence, float, float, Found, Chosen]:
     """The geometry prior under which everything together is most probable, and what is found with it."""
     tried = [_with_prior(problem, prior) for prior in GEOMETRY_PRIORS]
     _, *best = max(tried, key=lambda one: one[0])
-    if _geometry_is_off(problem, best[0], best[3]):
-        return _with_geometry(problem)
-    return (*best, Chosen())
+    calibrated = (*best, Chosen())
+    if not _geometry_strays(problem):
+        return calibrated
+    drawn = _with_geometry(problem)
+    left, with_geometry = (_kept_out_m2(problem, one) for one in (calibrated, drawn))
+    return drawn if left > FAR_LEFT * floor_m2 and with_geometry < GEOMETRY_CLOSES * left else calibrated
 
 
 def _with_prior(problem: Problem, prior: float) -> tuple[float, Evidence, float, float, Found]:
@@ -217,16 +220,19 @@ def _with_prior(problem: Problem, prior: float) -> tuple[float, Evidence, float,
     return found.log_evidence + evidence.nuisance_evidence, evidence, prior, threshold, found
 
 
-def _geometry_is_off(problem: Problem, evidence: Evidence, found: Found) -> bool:
-    """Whether the geometry strays beyond what a calibration leaves even with all that was found beside it."""
-    _, estimate = numbers(problem, evidence, UNCALIBRATED, found.chosen)
+def _geometry_strays(problem: Problem) -> bool:
+    """Whether geometry alone would have to stray far beyond what a calibration leaves."""
+    evidence = problem.evidence(UNCALIBRATED)
+    _, estimate = numbers(problem, evidence, UNCALIBRATED, Chosen())
     strays = estimate[problem.placement : problem.nuisance] / AS_CALIBRATED
-    if not np.sum(strays**2) > STRAY**2 * len(strays):
-        return False
-    fold = blocks(problem.sim.seen)
-    kept = [KeptOut(problem, fold, prior, found.chosen.groups) for prior in (KNOWN, UNCALIBRATED)]
-    closely, freely = (one.square_m2(found.chosen) for one in kept)
-    return freely < GEOMETRY_CLOSES * closely and closely > LEFT_BY_CAUSES * kept[0].square_m2(Chosen())
+    return bool(np.sum(strays**2) > STRAY**2 * len(strays))
+
+
+def _kept_out_m2(problem: Problem, found: tuple[Evidence, float, float, Found, Chosen]) -> float:
+    """What a hypothesis leaves of kept-out points, m^2."""
+    _, prior, _, names, given = found
+    everything = joined(given, names.worth)
+    return KeptOut(problem, blocks(problem.sim.seen), prior, everything.groups).square_m2(everything)
 
 
 def null_threshold(problem: Problem, evidence: Evidence) -> float:
@@ -269,8 +275,9 @@ def _learn(
     evidence, prior, threshold, found, given = best
     everything = joined(given, found.chosen)
     named_left, own = _left(problem, evidence, prior, everything)
-    left, _ = _left(problem, evidence, prior, _flexible(problem, evidence, everything, threshold))
-    noise = _learned_noise(told, problem, evidence, left, first)
+    flexible = _flexible(problem, evidence, everything, threshold)
+    left, _ = _left(problem, evidence, prior, flexible)
+    noise = _learned_noise(told, problem, _spent(problem, evidence, prior, flexible), left, first)
     scale = 3 * noise.weight / np.trace(noise.covariance_m2, axis1=1, axis2=2)
     chosen = [problem.candidates[g] for g in everything.groups]
     better = sharpened(problem.sim, told, chosen, named_left, own, scale)
@@ -285,14 +292,24 @@ def _learn(
 
 
 def _flexible(problem: Problem, evidence: Evidence, chosen: Chosen, threshold: float) -> Chosen:
+    widths = np.array([problem.slices[g].stop - problem.slices[g].start for g in problem.nameless])
     for _ in range(MOST_FLEXIBLE):
         gains = evidence.gains(problem.nameless, chosen)
-        score = np.where(np.isin(problem.nameless, chosen.groups), -np.inf, gains.evidence)
+        taken = np.isin(problem.nameless, chosen.groups) | (widths > problem.sums.count * MOST_SPENT)
+        score = np.where(taken, -np.inf, gains.evidence)
         best = int(np.argmax(score))
         if not score[best] > threshold:
             break
         chosen = chosen.plus(int(problem.nameless[best]), float(gains.size[best]))
     return chosen
+
+
+def _spent(problem: Problem, evidence: Evidence, prior: float, chosen: Chosen) -> float:
+    """Degrees of freedom that a fit takes: the trace of its hat matrix."""
+    index = np.concatenate([np.arange(problem.nuisance), evidence.index(chosen.groups)]).astype(int)
+    precision = np.concatenate([problem.nuisance_precision(prior), evidence.prior(chosen)])
+    square = problem.sums.square[np.ix_(index, index)]
+    return float(np.trace(np.linalg.solve(square + np.diag(precision), square)))
 
 
 def numbers(problem: Problem, evidence: Evidence, prior: float, chosen: Chosen) -> tuple[np.ndarray, Array]:
@@ -335,12 +352,12 @@ def _about_fit(problem: Problem, evidence: Evidence, prior: float, chosen: Chose
     return anew, sim.seen.point_m - anew.points_m() - bent, float(np.mean(np.sum(missed**2, axis=1)))
 
 
-def _learned_noise(told: Doings, problem: Problem, evidence: Evidence, left: Array, first: NoiseFound) -> NoiseFound:
+def _learned_noise(told: Doings, problem: Problem, spent: float, left: Array, first: NoiseFound) -> NoiseFound:
     """Scale, tails, memory and outliers of what a flexible fit leaves, beside the scatter of repeats."""
     covariance = first.covariance_m2
     standard = whitening(covariance, np.ones(len(left))).rows(left)
     used = first.weight > 0
-    freedom = max(3 * np.count_nonzero(used) - problem.nuisance, 3)
+    freedom = max(3 * np.count_nonzero(used) - spent, 3)
     variance = noise_found.robust_variance(standard[used]) * 3 * np.count_nonzero(used) / freedom
     scaled = standard / np.sqrt(max(variance, 1e-300))
     memory = noise_found.memory(told, scaled, used)

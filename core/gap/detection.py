@@ -6,6 +6,7 @@ from core.gap.evidence import Evidence
 from core.gap.problem import Problem
 from core.gap.result import DetectionLimit
 
+UNITS = ("rad_per_nm", "m_per_n", "rad_per_m", "m_per_rad", "per_k", "rad", "m", "s", "1")
 SURE = 3.0
 """Log evidence above the threshold at which an effect is hardly ever missed."""
 
@@ -22,7 +23,7 @@ def detection_limits(problem: Problem, evidence: Evidence, threshold: float) -> 
         if not square > 1e-12:
             continue
         number = np.sqrt((needed + 2 * problem.cost[k] + np.log1p(square)) / square)
-        unit = candidate.names[0].rsplit("_", 1)[-1]
+        unit = next(unit for unit in UNITS if candidate.names[0].endswith(f"_{unit}"))
         moved = np.sqrt(problem.sums.square[column, column] / max(problem.sums.count / 3, 1)) * number * noise_m
         limit = DetectionLimit(candidate.place, float(number * problem.design.scale[column]), unit, float(moved))
         place = candidate.place

@@ -14,13 +14,13 @@ from core.gap.analysis import Analysis, Progress, analyse
 from core.gap.corrected import CorrectedSim, Diagnosis
 from core.gap.detection import detection_limits
 from core.gap.effects.candidate import Candidate
-from core.gap.evidence import Chosen, joined
+from core.gap.evidence import Chosen, joined, without
 from core.gap.folds import blocks
 from core.gap.kept_out import KeptOut, mean_square
 from core.gap.observations import Observations, observe
 from core.gap.open_set import Judge, Stand, stands
 from core.gap.placement import placement_slots
-from core.gap.posterior import rivals, twins
+from core.gap.posterior import adequate, rivals, twins
 from core.gap.problem import Problem
 from core.gap.result import (
     UNKNOWN,
@@ -51,6 +51,8 @@ SURE_OF_REST = 0.1
 """What nameless functions must still close, as a share of the gap, to be told as something unknown."""
 CLOSED = 0.9
 """Share of the gap beyond the floor that causes must close to explain it."""
+NEARLY = 2.0
+"""Floors that may be left at most where causes explain a gap."""
 NOISE_LIKE = 0.01
 """Probability below which what is left is not noise."""
 
@@ -149,6 +151,10 @@ class Findings:
         """Whether geometry that is fitted anyway is worth telling of."""
         if stand.groups[0] not in self.analysis.given.groups:
             return True
+        a = self.analysis
+        known = without(joined(a.given, a.found.worth), stand.groups)
+        if not a.evidence.gains(np.array(stand.groups), known).evidence[0] > 0:
+            return False
         rest = _chosen([one for one in others if one is not stand])
         kept, closable = self.judge.kept_out, self.judge.closable_m2
         return kept.square_m2(rest) - kept.square_m2(joined(rest, _chosen([stand]))) > TOLD_SHARE * closable
@@ -272,7 +278,8 @@ class Findings:
             return Verdict.UNEXPLAINED
         base = max(self.gap_m2 - self.floor_m2, 1e-3 * self.floor_m2)
         unknown = any(one.unknown for one in self.stands)
-        closed = (self.gap_m2 - self.left_m2) / base >= CLOSED or self.left_test.left_is_noise
+        nearly = (self.gap_m2 - self.left_m2) / base >= CLOSED and self.left_m2 <= NEARLY**2 * self.floor_m2
+        closed = nearly or self.left_test.left_is_noise
         return Verdict.EXPLAINED if closed and not unknown else Verdict.PARTLY_EXPLAINED
 
 
@@ -362,9 +369,12 @@ def _causes(found: Findings) -> tuple[Cause, ...]:
 def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, tuple[Place, ...]]:
     if stand.unknown:
         return UNKNOWN_PROBABILITY, (stand.place,)
-    if found.told or stand.groups[0] in found.analysis.given.groups:
+    if found.told:
         return 1.0, (stand.place,)
-    return twins(stand, rivals(found.judge, stand, others))
+    probability, alike = twins(stand, rivals(found.judge, stand, joined(others, found.analysis.found.worth)))
+    if len(found.named) == len(found.stands):
+        return probability, alike
+    return probability * adequate(found.judge, _chosen(found.named), _chosen(found.stands)), alike
 
 
 def _parameters(found: Findings, stand: Stand) -> tuple[Parameter, ...]:

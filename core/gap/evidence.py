@@ -46,6 +46,12 @@ def joined(*parts: Chosen) -> Chosen:
     return Chosen(tuple(groups), tuple(groups.values()))
 
 
+def without(chosen: Chosen, groups: Sequence[int]) -> Chosen:
+    """A choice less some candidates."""
+    kept = [k for k, g in enumerate(chosen.groups) if g not in groups]
+    return Chosen(tuple(chosen.groups[k] for k in kept), tuple(chosen.sizes[k] for k in kept))
+
+
 @dataclass(frozen=True, eq=False)
 class Gains:
     """For each of some groups: log evidence gained over what is given, and the scale that gains it."""

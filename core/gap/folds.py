@@ -1,5 +1,7 @@
 """Which points are kept out of a fit together: pieces of arcs and regions of the joint space, never single points."""
 
+import warnings
+
 import numpy as np
 from scipy.cluster.vq import kmeans2
 
@@ -49,7 +51,10 @@ def regions(active: Array, span: Array, count: int = REGIONS) -> np.ndarray:
     count = min(count, max(FOLDS, len(places) // 3))
     if len(places) <= count:
         return which.ravel()
-    _, label = kmeans2(places, count, minit="++", seed=SEED)
+    with warnings.catch_warnings():
+        # A region that stays empty does no harm.
+        warnings.simplefilter("ignore", UserWarning)
+        _, label = kmeans2(places, count, minit="++", seed=SEED)
     return label[which.ravel()]
 
 

@@ -19,7 +19,7 @@ class Loads:
     """At every joint's origin, in the frame that moves with it, (m, n, 3), N m."""
     joint_kilogram: Array
     joint_offset: Array
-    """Moment about each joint's axis of one kilogram moved by one metre along each axis of the last frame, (m, n, 3)."""
+    """Moment about each joint's axis of one kilogram moved by a metre along each axis of the last frame, (m, n, 3)."""
     force_own: Array
     """Weight beyond every joint in the frame that moves with it, (m, n, 3), N."""
     force_kilogram: Array

@@ -20,6 +20,8 @@ from core.geometry import Array
 SMOOTH = frozenset({"zero_offset", "ratio", "eccentricity", "linkage", "axis_wobble", "geometry"})
 """Smooth functions of one joint; so is a mesh with fewer waves a turn than ``RIPPLE``."""
 RIPPLE = 6.0
+EXACT, EXACTLY = frozenset({"zero_offset", "ratio", "eccentricity", "mesh"}), 0.98
+"""Smooth effects whose forms are exact must close nearly all: whatever is smooth looks like them otherwise."""
 LOCALLY, GLOBALLY = 0.92, 0.75
 """Shares of what nameless functions close that a name must close to stand."""
 WEAKER = 0.10
@@ -203,7 +205,8 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen) -> list[St
     first = order[0]
     share = closes[first] / max(ceiling, 1e-300)
     same = [k for k in order if _place(judge, here, k).same_as(_place(judge, here, first))]
-    if share >= LOCALLY:
+    plain = judge.problem.candidates[here.groups[first]]
+    if share >= (EXACTLY if plain.place.effect in EXACT and _smooth(plain) else LOCALLY):
         return [_stand(judge, here, same if _place(judge, here, first).effect in COMPLETED else [first], share)]
     if len(same) > 1 and _place(judge, here, first).effect in COMPLETED:
         together = (without - judge.square(joined(elsewhere, _pick(here, same)))) / max(ceiling, 1e-300)

@@ -6,10 +6,11 @@ changes the evidence by that share, so differences below it decide nothing.
 
 import numpy as np
 
-from core.gap.evidence import Chosen, joined
+from core.gap.evidence import Chosen, joined, without
 from core.gap.open_set import LOCALLY, Judge, Stand
 from core.gap.result import Place
 
+NO_CAUSE = Place("none")
 FORM_ERROR = 0.002
 """Share of the evidence that rough forms of effects can be wrong by."""
 NAMED_AT, NAMED_WIDTH = LOCALLY, 0.012
@@ -20,9 +21,10 @@ TWIN_ODDS = 0.05
 def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, float]]:
     """Named places with their probabilities, given the other causes, most probable first."""
     named = judge.problem.named
-    gains = judge.evidence.gains(named, joined(judge.given, others))
+    known = without(joined(judge.given, others), stand.groups)
+    gains = judge.evidence.gains(named, known)
     score = gains.evidence - judge.problem.cost[named]
-    score[np.isin(named, (*judge.given.groups, *others.groups))] = -np.inf
+    score[np.isin(named, known.groups)] = -np.inf
     places: list[Place] = []
     best: list[float] = []
     for k in np.argsort(score)[::-1]:
@@ -32,10 +34,19 @@ def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, floa
         if not any(place.same_as(known) for known in places):
             places.append(place)
             best.append(float(score[k]))
-    odds = np.array(best) - best[0]
-    odds /= np.sqrt(1 + (FORM_ERROR * max(best[0], 0.0)) ** 2)
+    # No cause at all is one more possibility, without evidence and without cost.
+    places.append(NO_CAUSE)
+    best.append(0.0)
+    odds = np.array(best) - max(best)
+    odds /= np.sqrt(1 + (FORM_ERROR * max(best)) ** 2)
     weight = np.exp(odds)
     return list(zip(places, weight / weight.sum(), strict=True))
+
+
+def adequate(judge: Judge, named: Chosen, everything: Chosen) -> float:
+    """Share of what can be closed at all that names close: where much has no name, names may stand in for it."""
+    base = judge.square(Chosen())
+    return float(np.clip((base - judge.square(named)) / max(base - judge.square(everything), 1e-300), 0.0, 1.0))
 
 
 def has_name(stand: Stand) -> float:
@@ -46,5 +57,9 @@ def has_name(stand: Stand) -> float:
 def twins(stand: Stand, ranked: list[tuple[Place, float]]) -> tuple[float, tuple[Place, ...]]:
     """Probability of the place that stands, and the places that the data cannot tell from it, itself first."""
     mine = next((p for place, p in ranked if place.same_as(stand.place)), 0.0)
-    others = [place for place, p in ranked if not place.same_as(stand.place) and p >= TWIN_ODDS * max(mine, 1e-12)]
+    others = [
+        place
+        for place, p in ranked
+        if place is not NO_CAUSE and not place.same_as(stand.place) and p >= TWIN_ODDS * max(mine, 1e-12)
+    ]
     return mine * has_name(stand), (stand.place, *others[:11])

@@ -100,16 +100,24 @@ class Spectrum:
         power[(wave < 1 / coarsest) | (np.arange(len(power)) > SPECTRUM_BINS // 4)] = 0.0
         return power / max(float(np.sum(self.error**2)), 1e-300)
 
+    @cached_property
+    def whole(self) -> Array:
+        """Energy that each wave explains with the amplitude that whole steps of its length have, like ``power``.
+
+        Where a joint stood at few places, many lengths of steps look alike but for that.
+        """
+        amplitude = 2 * self.span / (np.pi * np.maximum(np.arange(len(self.power)), 1))
+        pull = np.sqrt(self.power * float(np.sum(self.error**2)))
+        return 2 * amplitude * pull - amplitude**2 * self.strength.sum() / 2
+
     def steps(self) -> tuple[float, float] | None:
         """Size and phase of the steps that stand out; None: none."""
         if self.span < 4 * (COARSEST_STEP_M if self.sliding else COARSEST_STEP_RAD) / 3:
             return None
-        best = None
-        for k in _largest(self.power, 3):
-            if self.power[k] > PEAK:
-                found = self.saw_near(2 * self.span / k)
-                best = found if best is None or found[0] > best[0] else best
-        return None if best is None or best[0] <= 0 else best[1:]
+        standing_out = np.where(self.power > PEAK, self.whole, 0.0)
+        found = [self.saw_near(2 * self.span / k) for k in _largest(standing_out, 3)]
+        best = max(found, default=(0.0,))
+        return best[1:] if best[0] > 0 else None
 
     def saw_near(self, step: float) -> tuple[float, float, float]:
         """The best explained energy near a size of steps, with the size and the phase."""
@@ -125,10 +133,12 @@ class Spectrum:
         return max((self.explained(step, phase), phase) for phase in PHASES)
 
     def explained(self, step: float, phase: float) -> float:
-        """Energy that steps explain; negative where the saw-teeth would have to be turned round."""
+        """Energy that whole steps explain; negative where they would be too much, or turned round.
+
+        A share of coarser steps may look alike at the few places where a joint stood, and is none.
+        """
         teeth = drives.saw(self.x, step, phase)
-        pull, square = teeth @ self.error, teeth**2 @ self.strength
-        return float(pull * abs(pull) / max(square, 1e-300))
+        return float(2 * (teeth @ self.error) - teeth**2 @ self.strength)
 
 
 def _largest(values: Array, count: int) -> np.ndarray:
@@ -141,13 +151,14 @@ def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | No
     """One size of steps for all turning joints, by the sum of their spectra; None: none stands out."""
     longest = max(spectrum.span for spectrum in spectra)
     waves = np.arange(1, SPECTRUM_BINS // 4) / (2 * longest)
-    total = np.zeros(len(waves))
+    total, whole = np.zeros(len(waves)), np.zeros(len(waves))
     for spectrum in spectra:
         place = np.minimum(np.rint(waves * 2 * spectrum.span).astype(int), SPECTRUM_BINS)
         total += spectrum.power[place]
-    if total.max() < PEAK + 2 * len(spectra):
-        return None
-    return max((_alike_near(spectra, 1 / waves[k]) for k in _largest(total, 3)), key=lambda found: found[0])[1]
+        whole += spectrum.whole[place]
+    places = _largest(np.where(total > PEAK + 2 * len(spectra), whole, 0.0), 3)
+    best = max((_alike_near(spectra, 1 / waves[k]) for k in places), key=lambda found: found[0], default=(0.0, {}))
+    return best[1] if best[0] > 0 else None
 
 
 def _alike_near(spectra: list[Spectrum], step: float) -> tuple[float, dict[int, tuple[float, float]]]:

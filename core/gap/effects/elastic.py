@@ -86,7 +86,10 @@ def _generous_compliance(doings: Doings, joint: int) -> Candidate:
         return plain.columns(doings) + [drive(doings, joint, feature) for feature in extra]
 
     name = plain.names[0]
-    names = (name, f"{name}_of_own_weight", f"{name}_at_full_load", *(f"{name}_times_offset_{a}_m" for a in "xyz"))
+    names = (
+        name,
+        *(f"{what}_{name}" for what in ("own_weight", "at_full_load", *(f"offset_{a}_times" for a in "xyz"))),
+    )
     one = ANGLE / largest
     rough, near = ROUGHLY * one, NEAR_M * one
     return replace(plain, names=names, columns=columns, reference=(one, rough, rough, near, near, near))
@@ -133,8 +136,8 @@ def _flexure(link: int, largest: float, rough: bool) -> Candidate:
     names = tuple(f"give_about_{axis}_rad_per_nm" for axis in "xyz")
     reference = (ANGLE / max(largest, 1e-9),) * 3
     if rough:
-        names += tuple(f"give_about_{axis}_of_own_weight_rad_per_nm" for axis in "xyz")
-        names += tuple(f"give_about_{axis}_times_offset_{c}_m" for axis in "xyz" for c in "xyz")
+        names += tuple(f"own_weight_give_about_{axis}_rad_per_nm" for axis in "xyz")
+        names += tuple(f"offset_{c}_times_give_about_{axis}_rad_per_nm" for axis in "xyz" for c in "xyz")
         reference += (ROUGHLY * reference[0],) * 3 + (NEAR_M * reference[0],) * 9
     atom = "under weights that are roughly known" if rough else ""
     return Candidate(Place("flexure", joint=link + 1), atom, names, columns, 2, reference)
@@ -158,9 +161,11 @@ def _payload(doings: Doings, heaviest: dict[int, float], logged: bool, centre: b
         return out
 
     atom = ("of the logged payload" if logged else "always there") + (", its centre elsewhere" if centre else "")
-    names = tuple(f"give_of_joint_{j + 1}_for_each_kilogram_1" for j in heaviest)
+    names = tuple(
+        f"give_of_joint_{j + 1}_{unit(doings, j)}_per_{'n' if doings.seen.chain.sliding[j] else 'nm'}" for j in heaviest
+    )
     reference = tuple(ANGLE / h for h in heaviest.values())
     if centre:
-        names += tuple(f"offset_{axis}_times_give_m" for axis in "xyz")
+        names += tuple(f"offset_{axis}_times_give_rad" for axis in "xyz")
         reference += (ANGLE * NEAR_M,) * 3
     return Candidate(Place("payload"), atom, names, columns, 4, reference)
