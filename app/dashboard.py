@@ -134,6 +134,7 @@ class Dashboard:
         if self.bench.rig.robot is self._drawn_for:
             self._show_all()
             return
+        self.verify.stop()
         with self.server.atomic():
             self.server.gui.reset()
             self.server.scene.reset()
@@ -157,6 +158,7 @@ class Dashboard:
     def stop(self) -> None:
         """Close server, worker and session."""
         self.bench.stop()
+        self.verify.stop()
         self.seat.close()
         self.jobs.close()
         with contextlib.redirect_stdout(io.StringIO()):

@@ -170,6 +170,20 @@ class PoseBench:
         self._bench.begin_run()
         self._measure(visit, by)
 
+    def measure_entered(self, visit: NextVisit, text: str, unit: str, by: str | None = None) -> None:
+        """The same with coordinates that a person typed in, one line x y z a target in the order of the visit.
+
+        Raises:
+            InputError: a line is no point, or there are not as many as targets; nothing is kept.
+            SessionError, InstrumentFailed: as for ``measure``.
+        """
+        count = self._bench.lay_ready(text, unit)
+        if count != len(visit.targets):
+            self._bench.lay_ready("", unit)
+            names = ", ".join(visit.targets)
+            raise InputError(f"{count} points were entered, expected {len(visit.targets)}, one line each: {names}")
+        self.measure(visit, by)
+
     def run(
         self,
         compensated: bool | None = None,

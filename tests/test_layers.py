@@ -62,7 +62,8 @@ APP = """
     app.rigs app.ahead app.workbench app.pose_bench app.jobs app.spots app.clicks
     app.words app.table_2 app.cell_view
     app.glossary app.keys app.uploads app.exports app.measure_words app.cell_words app.solve_words
-    app.pose_view app.pose_words app.compensate_bench app.compensate_words app.gap_bench app.gap_words app.gap_view app.panels app.verify_tabs app.gap_tabs
+    app.pose_view app.pose_words app.compensate_bench app.compensate_words app.compare_bench app.compare_words
+    app.gap_bench app.gap_words app.gap_view app.panels app.verify_tabs app.gap_tabs
     app.dashboard
     app.commands app.__main__
 """

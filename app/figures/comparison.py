@@ -70,7 +70,9 @@ def _figure(lines: list[_Line], title: str, unit: str, width_px: int) -> go.Figu
     x = {"type": "log", "tickvals": [step * 10.0**k for k in range(-3, 4) for step in (1, 2, 5)]}
     x_title = f"mean, bar to the 95th percentile [{unit}]"
     height = ROW_PX * len(ordered) + 10
-    figure = stacked(title, (Panel(traces, y, x),), x_title, height, width_px=width_px, legend_rows=LEGEND_ROWS)
+    # In a narrow figure the names of the methods leave room for one entry of the legend a line.
+    rows = LEGEND_ROWS if width_px >= WIDE_PX else len(GROUPS)
+    figure = stacked(title, (Panel(traces, y, x),), x_title, height, width_px=width_px, legend_rows=rows)
     figure.layout.margin.l = NAMES_PX
     return figure
 

@@ -7,7 +7,8 @@ import viser
 
 from app.figures.pose_errors import loop_figures
 from app.panels.plot_box import WIDTH_PX, PlotBox
-from app.pose_bench import LIMITS, PoseBench, TestPose
+from app.panels.typed_points import TypedPoints
+from app.pose_bench import LIMITS, NextVisit, PoseBench, TestPose
 from app.pose_view import PoseView, Shown
 from app.pose_words import WORD, step_words, summary_words, table_words
 from app.scene.cameras import fly_to, near
@@ -45,10 +46,11 @@ class VerifyPanel:
     def build(self, gui: viser.GuiApi) -> None:
         """Fill the tab at the left."""
         self._step = gui.add_html("")
+        self._typed = TypedPoints(gui, self._bench)
         gui.add_button("Measure pose", color="green", icon=viser.Icon.CROSSHAIR, hint="V").on_click(self.measure)
         self._way = gui.add_dropdown("Commands", tuple(WAYS), initial_value=IN_TURN)
         self._way.on_update(lambda event: self.refresh())
-        self._run_group = gui.add_button_group("Demo robot", ("Run all poses", "Stop"))
+        self._run_group = gui.add_button_group("Robot", ("Run all poses", "Stop"))
         self._run_group.on_click(self._run)
         self._bar = gui.add_progress_bar(0.0)
         self._history = gui.add_button_group("History", ("Undo", "Redo"))
@@ -80,6 +82,8 @@ class VerifyPanel:
         poses, (loop, why) = self._poses.poses(), self._poses.loop()
         way = WAYS.get(self._way.value)
         visit, solved = self._poses.next_visit(way), self._poses.arm is not None
+        self._typed.refresh()
+        self._run_group.visible = self._bench.rig.moves_itself
         self._step.content = step_words(visit, poses, self._bench.nominal, solved)
         done = sum((p.nominal_visit is not None) + (p.compensated_visit is not None) for p in poses)
         self._bar.value = 100.0 * done / max(2 * len(poses), 1)
@@ -102,15 +106,23 @@ class VerifyPanel:
 
     def measure(self, event: object) -> None:
         """Make the next open visit."""
-        way = WAYS.get(self._way.value)
+        way, typed = WAYS.get(self._way.value), self._typed.take()
 
         def job(client: object) -> None:
             visit = self._poses.next_visit(way)
             if visit is None:
                 raise InputError("No visit is open: choose a pose to measure it again, or plan new poses.")
-            self._poses.measure(visit)
+            self._make(visit, typed)
 
         self._ask(event, job)
+
+    def _make(self, visit: NextVisit, typed: tuple[str, str] | None) -> None:
+        """Make a visit, by the robot or by what a person has typed."""
+        if typed is None:
+            self._poses.measure(visit)
+        else:
+            self._poses.measure_entered(visit, *typed)
+            self._typed.clear()
 
     def _build_chosen(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("Chosen pose and errors in 3-D"):
@@ -136,7 +148,7 @@ class VerifyPanel:
 
     def _run(self, event: viser.GuiEvent) -> None:
         if self._run_group.value == "Stop":
-            self._bench.stop()
+            self._ask(event, lambda client: self._bench.stop(), at_once=True)
             return
         way = WAYS.get(self._way.value)
         self._ask(event, lambda client: self._poses.run(way))
@@ -146,13 +158,13 @@ class VerifyPanel:
         self._ask(event, lambda client: act())
 
     def _measure_again(self, event: viser.GuiEvent) -> None:
-        chosen, compensated = self._chosen, self._again.value == "compensated"
+        chosen, compensated, typed = self._chosen, self._again.value == "compensated", self._typed.take()
 
         def job(client: object) -> None:
             pose = next((p for p in self._poses.poses() if p.number == chosen), None)
             if pose is None:
                 raise InputError("No pose is chosen: click one in 3-D or in the table, or choose it in the list.")
-            self._poses.measure(self._poses.visit_of(pose, compensated))
+            self._make(self._poses.visit_of(pose, compensated), typed)
 
         self._ask(event, job)
 

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from app.pose_bench import PoseBench
+from app.rigs import SETTING, Source
 from app.workbench import Workbench
 from core.errors import InputError
 from core.instruments import InstrumentFailed
 from core.kinematics import forward, nominal_net
 from core.pose_visits import pose_visits
 from core.session import Session
-from core.session_events import PosesPlanned, SessionError
+from core.session_events import PosesPlanned, SessionError, Setting
 from core.session_store import SUFFIX
 from core.twin import irb_l6
 from core.twin.demo import demo_events
@@ -227,3 +228,23 @@ def test_a_session_without_targets_on_the_last_link_says_so(ready):
     visit = replace(poses.next_visit(), targets=())
     with pytest.raises(SessionError, match="no target on the last link"):
         poses.measure(visit)
+
+
+def test_a_person_moves_the_robot_and_types_what_the_instrument_shows(ready):
+    ready.session.append(Setting(SETTING, Source.BY_HAND))
+    ready.changed()
+    poses = PoseBench(ready)
+    visit = poses.next_visit()
+    for text, words in (
+        ("1 2 3\n4 5 6", "2 points were entered, expected 3, one line each: T1, T5, T6"),
+        ("1 2\n3 4 5\n6 7 8", "line 1"),
+        ("", "0 points were entered"),
+    ):
+        with pytest.raises(InputError, match=words):
+            poses.measure_entered(visit, text, "mm")
+        assert pose_visits(ready.state) == ()
+    poses.measure_entered(visit, "1 2 3\n4 5 6\n7 8 9", "mm")
+    made = pose_visits(ready.state)[0]
+    assert made.seen == {"T1", "T5", "T6"}
+    assert made.shots[1].taken.point_m == pytest.approx((0.004, 0.005, 0.006))
+    assert poses.next_visit().pose.number == 2

@@ -54,6 +54,13 @@ def solve(page) -> None:
     tab(page, "Verify")
 
 
+def send(page, path: Path) -> None:
+    """Send a file by the button for poses."""
+    with page.expect_file_chooser() as waiting:
+        press(page, "Compensate a CSV file")
+    waiting.value.set_files(path)
+
+
 def table(page) -> list[list[str]]:
     """Cells of the table of poses."""
     rows = page.locator("[data-testid=pose-table] tr").all()
@@ -65,7 +72,7 @@ def test_the_tab_comes_with_the_solution_and_the_loop_is_closed(page, dashboard)
     assert page.get_by_role("tab", name="Verify").count() == 0
     solve(page)
     labels = page.get_by_role("tab").all_inner_texts()
-    assert labels.index("Verify") == labels.index("4 Export") - 1
+    assert labels.index("3 Solve") < labels.index("Verify") < labels.index("Compensate") < labels.index("4 Export")
     wait_for_text(page, "verify-step", "Pose 1 of 12, nominal command")
     command = page.get_by_test_id("pose-command").inner_text()
     sent = [float(v) for v in re.findall(r"= (-?[\d.]+)°", command)]
@@ -173,7 +180,8 @@ def test_a_new_session_takes_the_tab_away(page, dashboard):
     press(page, "Measure pose")
     wait_for_text(page, "verify-step", "Pose 2 of 12")
     tab(page, "1 Cell")
-    group(page, "New")
+    page.get_by_text("New session", exact=True).filter(visible=True).last.click()
+    press(page, "Begin")
     page.get_by_role("tab", name="Verify").wait_for(state="detached")
     page.get_by_role("tab", name="Poses").wait_for(state="detached")
     assert dashboard.bench.calibration is None
@@ -211,8 +219,28 @@ def test_a_file_of_poses_is_sent_and_a_wrong_one_is_named(page, dashboard, tmp_p
     good, wrong = tmp_path / "poses.csv", tmp_path / "<b>wrong.csv"
     good.write_text(dashboard.verify._compensated.test_poses_csv(), encoding="utf-8")
     wrong.write_text("x_mm,y_mm,z_mm\n1,2,3\n", encoding="utf-8")
-    chooser = page.locator("input[type=file][id^=file_upload_]").first
-    chooser.set_input_files(wrong)
+    send(page, wrong)
     page.get_by_role("alert").filter(has_text="no orientation, expected columns qw").wait_for()
-    chooser.set_input_files(good)
+    send(page, good)
     wait_for_text(page, "compensated-count", "12 of 12 poses")
+
+
+def test_methods_are_compared_on_demand_while_the_page_goes_on(page, dashboard):
+    solve(page)
+    assert page.get_by_role("tab", name="Methods").count() == 0
+    tab(page, "Compare")
+    box = page.get_by_label("Trials", exact=True)
+    box.fill("1")
+    page.wait_for_timeout(300)
+    press(page, "Compare")
+    wait_for_text(page, "compare-progress", "Trial 1 of 1")
+    tab(page, "Verify")
+    press(page, "Measure pose")
+    wait_for_text(page, "verify-step", "Pose 2 of 12")
+    page.get_by_role("tab", name="Methods").wait_for(timeout=180_000)
+    found = dashboard.verify._compared.found
+    tab(page, "Methods")
+    wait_for_text(page, "compare-table", "paper, after")
+    assert page.locator("[data-testid=compare-table] tr").count() == len(found.rows) + len(found.references) + 2
+    tab(page, "Compare")
+    wait_for_text(page, "compare-verdict", "1 trial, 12 kept-out poses each")
