@@ -166,10 +166,15 @@ def stands(judge: Judge) -> list[Stand]:
     for k, group in enumerate(kept.groups):
         by_variable.setdefault(judge.variable(judge.problem.candidates[group].place), []).append(k)
     for variable, members in by_variable.items():
-        out += _at(
-            judge, variable, _pick(kept, members), _pick(kept, [k for k in range(len(kept.groups)) if k not in members])
-        )
+        out += _at(judge, variable, _pick(kept, members), _elsewhere(judge, variable, kept))
     return _steps_together(out)
+
+
+def _elsewhere(judge: Judge, variable: str, kept: Chosen) -> Chosen:
+    """All that was found at other variables, clutter included: nameless functions here shall not stand in for it."""
+    both = joined(kept, judge.found)
+    candidates = judge.problem.candidates
+    return _pick(both, [k for k, g in enumerate(both.groups) if judge.variable(candidates[g].place) != variable])
 
 
 def _steps_together(found: list[Stand]) -> list[Stand]:

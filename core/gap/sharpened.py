@@ -18,6 +18,8 @@ SPECTRUM_BINS = 1 << 18
 """Over the span of a joint."""
 PEAK = 20.0
 """A line of the spectrum must stand so many times above its neighbourhood."""
+ALIKE, LENGTH_MARGIN, MOST_TRIED = 0.7, 0.25, 6
+"""Waves of at least so much of the greatest power may be it, if their length is right to so much."""
 STEPS_AROUND, ALIKE_AROUND = 41, 61
 PHASES = tuple(float(phase) for phase in np.arange(8) / 8)
 
@@ -101,22 +103,17 @@ class Spectrum:
         return power / max(float(np.sum(self.error**2)), 1e-300)
 
     @cached_property
-    def whole(self) -> Array:
-        """Energy that each wave explains with the amplitude that whole steps of its length have, like ``power``.
-
-        Where a joint stood at few places, many lengths of steps look alike but for that.
-        """
-        amplitude = 2 * self.span / (np.pi * np.maximum(np.arange(len(self.power)), 1))
-        pull = np.sqrt(self.power * float(np.sum(self.error**2)))
-        return 2 * amplitude * pull - amplitude**2 * self.strength.sum() / 2
+    def pull(self) -> Array:
+        """Of each wave on the errors, like ``power``, without its unit."""
+        return np.sqrt(self.power * float(np.sum(self.error**2)))
 
     def steps(self) -> tuple[float, float] | None:
         """Size and phase of the steps that stand out; None: none."""
         if self.span < 4 * (COARSEST_STEP_M if self.sliding else COARSEST_STEP_RAD) / 3:
             return None
-        standing_out = np.where(self.power > PEAK, self.whole, 0.0)
-        found = [self.saw_near(2 * self.span / k) for k in _largest(standing_out, 3)]
-        best = max(found, default=(0.0,))
+        wave = np.arange(len(self.power)) / (2 * self.span)
+        places = _whole_steps(wave, self.power, self.pull, float(self.strength.sum()), PEAK)
+        best = max((self.saw_near(1 / wave[k]) for k in places), default=(0.0,))
         return best[1:] if best[0] > 0 else None
 
     def saw_near(self, step: float) -> tuple[float, float, float]:
@@ -141,22 +138,32 @@ class Spectrum:
         return float(2 * (teeth @ self.error) - teeth**2 @ self.strength)
 
 
-def _largest(values: Array, count: int) -> np.ndarray:
-    """Places of the largest values."""
-    high = np.flatnonzero(values > 0.5 * values.max(initial=0.0))
-    return high[np.argsort(values[high])[::-1][:count]]
+def _whole_steps(wave: Array, power: Array, pull: Array, strength: float, peak: float) -> np.ndarray:
+    """Waves that stand out with the amplitude that whole steps of their length have, a few of the strongest.
+
+    Where a joint stood at few places, steps of many lengths look alike but for that: a saw-tooth of steps s has a
+    fundamental wave of amplitude s / pi.
+    """
+    strongest = int(np.argmax(power))
+    if not power[strongest] > peak:
+        return np.zeros(0, dtype=int)
+    expected = strength / (2 * np.pi * pull[strongest])
+    fits = (power > ALIKE * power[strongest]) & (np.abs(wave / expected - 1) < LENGTH_MARGIN)
+    high = np.flatnonzero(fits)
+    return high[np.argsort(power[high])[::-1][:MOST_TRIED]]
 
 
 def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | None:
     """One size of steps for all turning joints, by the sum of their spectra; None: none stands out."""
     longest = max(spectrum.span for spectrum in spectra)
     waves = np.arange(1, SPECTRUM_BINS // 4) / (2 * longest)
-    total, whole = np.zeros(len(waves)), np.zeros(len(waves))
+    total, pull = np.zeros(len(waves)), np.zeros(len(waves))
     for spectrum in spectra:
         place = np.minimum(np.rint(waves * 2 * spectrum.span).astype(int), SPECTRUM_BINS)
         total += spectrum.power[place]
-        whole += spectrum.whole[place]
-    places = _largest(np.where(total > PEAK + 2 * len(spectra), whole, 0.0), 3)
+        pull += spectrum.pull[place]
+    strength = sum(float(spectrum.strength.sum()) for spectrum in spectra)
+    places = _whole_steps(waves, total, pull, strength, PEAK + 2 * len(spectra))
     best = max((_alike_near(spectra, 1 / waves[k]) for k in places), key=lambda found: found[0], default=(0.0, {}))
     return best[1] if best[0] > 0 else None
 
