@@ -16,6 +16,7 @@ from app.scene.points import PointMarks, PointsView, Verdict
 from app.scene.robot import RobotView
 from app.scene.stage import prepare_stage
 from app.scene.stations import Station, StationsView
+from app.scene.sweep_circle import SweepCircle
 from app.spots import Spot
 from app.workbench import Workbench
 from core.calibration import Calibration
@@ -42,6 +43,8 @@ class CellView:
         self._base = bench.base().base
         self._draw_arms()
         self.points = PointsView(viewer)
+        self.circle = SweepCircle(viewer)
+        self._circled: object = None
         self.errors = ErrorVectors(viewer)
         self.errors.visible = False
         self._axes: AxesView | None = None
@@ -137,11 +140,24 @@ class CellView:
         self.points.show(PointMarks(np.arange(len(shots)), points, self._colours([s.record for s in shots]), verdicts))
         self.points.mark_last(points[-1] if len(points) else None)
         self.stations.aim(points[-1] if len(points) else None)
+        self._show_circle()
         expected = self._bench.expected()
         if expected is None:
             self.points.expect(None)
         else:
             self.points.expect(expected.point_m, expected.axis)
+
+    def _show_circle(self) -> None:
+        """The circle of the sweep that was measured last, as far as it is known."""
+        last = next((s for s in reversed(self._bench.state.shots) if s.taken.phase == "sweep"), None)
+        so_far = None if last is None else self._bench.so_far(last.taken.joint, last.taken.sweep)
+        if so_far is self._circled:
+            return
+        self._circled = so_far
+        if so_far is None:
+            self.circle.show(None, np.zeros((0, 3)), np.zeros(0, dtype=int))
+        else:
+            self.circle.show(so_far.live.fit, so_far.points_m, so_far.target)
 
     def show_calibration(self, found: Calibration) -> None:
         """Show the fitted axes with their uncertainty, the nominal arm as a ghost, and the residuals."""

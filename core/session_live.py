@@ -29,6 +29,16 @@ class SweepSoFar:
     """Those that the axis rests on, in the order of measurement."""
 
     @property
+    def points_m(self) -> Array:
+        """The shots, (k, 3)."""
+        return np.array([shot.taken.point_m for shot in self.shots]).reshape(-1, 3)
+
+    @property
+    def target(self) -> np.ndarray:
+        """Index of the target of each shot, by names in alphabetical order, as in the fit, integer (k,)."""
+        return np.unique([shot.taken.target for shot in self.shots], return_inverse=True)[1].astype(int)
+
+    @property
     def commanded(self) -> Array:
         """Commanded displacement of the joint at each shot, rad or m, (k,)."""
         return np.array([shot.taken.commanded[self.joint - 1] for shot in self.shots])
@@ -92,7 +102,7 @@ def base_so_far(state: State, sweeps: Callable[[int, int], SweepSoFar] | None = 
 
 def _rough_place(state: State, robot: Robot) -> Array:
     """Where the base may stand as long as no axis is known, (3,): so that the end of the arm is where a target was."""
-    seen = (s for s in reversed(state.shots) if s.counts and s.taken.point_m and state.target_links.get(s.taken.target))
+    seen = (s for s in state.shots if s.counts and s.taken.point_m and state.target_links.get(s.taken.target))
     shot = next(seen, None)
     reach = float(np.linalg.norm(robot.link_transforms[:, :3, 3], axis=1).sum())
     if shot is None:
