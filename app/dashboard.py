@@ -139,6 +139,8 @@ class Dashboard:
             self.server.gui.reset()
             self.server.scene.reset()
             self._draw_page()
+            if self._dark:
+                self.view.tick_dark()
 
     def _show_all(self) -> None:
         with self.server.atomic():
@@ -166,6 +168,7 @@ class Dashboard:
         self.bench.session.close()
 
     def _darken(self, dark: bool) -> None:
+        self._dark = dark
         self.server.gui.configure_theme(dark_mode=dark, **THEME)
         self.results.show_dark(dark)
         self.verify.show_dark(dark)
@@ -191,9 +194,8 @@ class Dashboard:
         if spot is None:
             self.verify.heard(client, word)
             return
-        if self.seat.may(client.client_id):
-            self.view.light(spot)
-        camera = self.cell.camera_at(spot)
+        shown = self.view.light(spot) if self.seat.may(client.client_id) else spot
+        camera = self.cell.camera_at(shown)
         if camera is not None:
             fly_to(client, camera)
 

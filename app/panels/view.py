@@ -20,17 +20,10 @@ EXAGGERATION = (1, 500, 1)
 """Least, most and step of how many times too large residuals and differences are drawn."""
 WIDEST = 720.0
 """Deg or mm, of a slider for a joint without limits."""
-KEYS = (
-    ("Space", "Measure the next shot"),
-    ("R", "Measure the chosen shot again"),
-    ("Backspace", "Undo"),
-    ("S", "Solve"),
-    ("V", "Measure the next test pose"),
-)
 
 
 class ViewPanel:
-    """Switches, magnification, cameras, the pose that is drawn, and the keys."""
+    """Switches, magnification, cameras, and the pose that is drawn."""
 
     def __init__(
         self,
@@ -59,12 +52,10 @@ class ViewPanel:
             self._scales = [1e3 if joint.slides else 180 / np.pi for joint in cell.joints]
             self._sliders = [self._joint_slider(gui, k) for k in range(len(cell.joints))]
             gui.add_button("Back to the robot's pose").on_click(self._back)
-        rows = "".join(f"<tr><td><b>{key}</b></td><td>{what}</td></tr>" for key, what in KEYS)
-        gui.add_html(
-            block(
-                f"<h3>Keys</h3><table>{rows}</table><p class='soft'>Keys are off while you type in a box.</p>", "keys"
-            )
-        )
+
+    def tick_dark(self) -> None:
+        """Show that the page is dark, where it is drawn anew."""
+        self._dark.value = True
 
     def refresh(self) -> None:
         """Show what the colours of the shots mean, and where the robot stands."""
@@ -85,10 +76,11 @@ class ViewPanel:
         for slider, value, scale in zip(self._sliders, self._cell.commanded, self._scales, strict=True):
             slider.value = float(np.clip(round(value * scale, 1), slider.min, slider.max))
 
-    def light(self, spot: Spot) -> None:
-        """Draw what a result speaks of in the colour of attention."""
+    def light(self, spot: Spot) -> Spot | None:
+        """Draw what a result speaks of in the colour of attention, or no more if it was; gives what is drawn so."""
         self._geometry.value = bool(spot.parameter)
-        self._cell.light(spot)
+        self._cell.light(None if spot == self._cell.lit else spot)
+        return self._cell.lit
 
     def _slider(self, gui: "viser.GuiApi", name: str, range_: tuple[float, float, float], at: float, act: Callable):
         """A slider that acts when a browser moves it, not when the program does."""

@@ -277,3 +277,18 @@ def test_a_session_is_found_copied_sent_and_opened_again(page, dashboard, tmp_pa
     page.wait_for_function("() => document.querySelector('[data-testid=cell]').innerText.includes('sent')")
     assert dashboard.bench.session.path != measure_first
     assert len(dashboard.bench.state.shots) == 2
+
+
+def test_a_dark_page_stays_dark_when_another_robot_is_drawn(page, dashboard):
+    tab(page, "View")
+    page.get_by_label("Dark theme", exact=True).filter(visible=True).check()
+    page.wait_for_function("() => document.documentElement.dataset.mantineColorScheme === 'dark'")
+    tab(page, "1 Cell")
+    folder(page, "New session")
+    send(page, "robot.toml", ROBOT)
+    wait_for_text(page, "tray", "press Begin")
+    begin(page)
+    wait_for_text(page, "cell-intro", "Three axes")
+    assert page.evaluate("document.documentElement.dataset.mantineColorScheme") == "dark"
+    tab(page, "View")
+    assert page.get_by_label("Dark theme", exact=True).filter(visible=True).is_checked()

@@ -159,3 +159,17 @@ def test_a_busy_port_is_an_error_and_another_address_warns(port, tmp_path):
     third = Server(tmp_path, port, "--host", "0.0.0.0")
     time.sleep(0.3)
     assert "there is no password" in third.stop()
+
+
+def test_a_campaign_folder_opens_as_a_session(page, port, tmp_path):
+    server = Server(tmp_path, port, str(ROOT / "sample_data" / "irb_l6"))
+    try:
+        assert "irb_l6.trueaxis" in server.said
+        visit(page, port)
+        tab(page, "3 Solve")
+        press(page, "Solve")
+        page.wait_for_selector("[data-testid=noise]")
+    finally:
+        server.stop()
+    with Session.open(tmp_path / f"irb_l6{SUFFIX}", read_only=True) as session:
+        assert len(session.state.solves) == 1
