@@ -4,7 +4,7 @@ import threading
 
 import numpy as np
 
-from app.scene.axes import AxesView, AxisMark, tube_exaggeration
+from app.scene.axes import LENGTH_OF_REACH, AxesView, AxisMark, tube_exaggeration
 from app.scene.cameras import Camera, presets
 from app.scene.colours import GHOST, ResidualScale
 from app.scene.diagnosis import DiagnosisView
@@ -25,8 +25,8 @@ from core.geometry import Array
 from core.robot import Joint
 
 BLUE = (0, 114, 178)
-AXIS_OF_REACH, TUBE_OF_REACH = 0.4, 0.02
-"""Length of the axes that are drawn, and greatest radius of their tubes, as shares of the arm's reach."""
+TUBE_OF_REACH = 0.02
+"""Greatest radius of the tubes about the axes, as a share of the arm's reach."""
 GHOST_SWELL_M = 0.01
 """The ghost is that much thicker, so that it does not flicker with the arm inside it."""
 SEEN_MOVING_M = 1e-3
@@ -56,6 +56,8 @@ class CellView:
         """Where the arms are drawn."""
         self.drawn: Calibration | None = None
         """The calibration that is shown."""
+        self.lit: Spot | None = None
+        """What is drawn in the colour of attention."""
         self.tube_exaggeration = 1.0
         """How many times too wide the tubes of uncertainty about the axes are."""
         self.scale = ResidualScale(1e-3)
@@ -161,7 +163,7 @@ class CellView:
 
     def show_calibration(self, found: Calibration) -> None:
         """Show the fitted axes with their uncertainty, the nominal arm as a ghost, and the residuals."""
-        self.drawn = found
+        self.drawn, self.lit = found, None
         self.scale = ResidualScale.over(found.refinement.residuals.radial_m)
         geometry = found.estimate.geometry
         if geometry is not None and found.nominal is not None:
@@ -177,7 +179,7 @@ class CellView:
 
     def _show_axes(self, estimate: ArmEstimate) -> None:
         reach = self.arm.bones.reach_m
-        marks, length = axis_marks(estimate, self.arm.bones.hubs_m), AXIS_OF_REACH * reach
+        marks, length = axis_marks(estimate, self.arm.bones.hubs_m), LENGTH_OF_REACH * reach
         self.tube_exaggeration = tube_exaggeration(marks, length, TUBE_OF_REACH * reach)
         if self._axes is not None:
             self._axes.place(marks, self.tube_exaggeration)
@@ -227,6 +229,7 @@ class CellView:
             )
         if self._diagnosis is not None:
             self._diagnosis.visible = wanted
+            self.light(None)
         shown = wanted and self._diagnosis is not None
         self.arm.opacity = 0.2 if shown else None
         if self._axes is not None:
@@ -234,6 +237,7 @@ class CellView:
 
     def light(self, spot: Spot | None) -> None:
         """Draw what a result speaks of in the colour of attention: a dimension, or the axis of a joint; None: none."""
+        self.lit = spot
         if self._diagnosis is not None:
             shown = spot is not None and self._diagnosis.has(spot.number, spot.parameter)
             self._diagnosis.highlight(spot.number if shown else None, spot.parameter if shown else "")
@@ -241,8 +245,10 @@ class CellView:
             joint = spot is not None and not spot.parameter and spot.number <= len(self.arm.axes)
             self._axes.highlight(spot.number if joint else None)
 
-    def camera_at(self, spot: Spot) -> Camera | None:
-        """Where to see it from; None: it is not drawn."""
+    def camera_at(self, spot: Spot | None) -> Camera | None:
+        """Where to see it from, None: where all of it is seen; None if it is not drawn."""
+        if spot is None:
+            return None if self._diagnosis is None else self._diagnosis.overview()
         if not spot.parameter:
             return next((c for c in self.cameras() if c.name == f"Joint {spot.number}"), None)
         if self._diagnosis is None or not self._diagnosis.has(spot.number, spot.parameter):

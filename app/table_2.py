@@ -73,7 +73,7 @@ def table_2(found: "Calibration", limits: Limits) -> str:
     note = (
         "<p class='soft'>▲ deviates by more than two standard uncertainties u. Parameters fixed by convention are left "
         "out. A limit is kept (✔) or broken (✖) where two u do not reach across it; else it is open (?). Click a row "
-        "to see it in 3-D.</p>"
+        "to see it in 3-D, again to see them all.</p>"
     )
     table = f"<table><tr><th></th>{numbers}<th></th><th></th><th>Limit</th></tr>{rows}</table>"
     return block(listening(table) + note, "table2")

@@ -77,6 +77,9 @@ def test_a_row_of_table_2_is_flown_to_and_lit(page, dashboard):
     page.locator("[data-say='2-b_m']").focus()
     page.keyboard.press("Enter")
     until(lambda: colour_of(dashboard, "/diagnosis/dimensions/2_b_m") == HIGHLIGHT)
+    page.keyboard.press("Enter")
+    until(lambda: colour_of(dashboard, "/diagnosis/dimensions/2_b_m") != HIGHLIGHT)
+    until(lambda: stands_at(client_of(dashboard), dashboard.cell._diagnosis.overview()))
 
 
 def test_a_finding_about_a_drive_shows_its_axis(page, dashboard):
