@@ -17,12 +17,13 @@ from pathlib import Path
 
 from core.campaign_files import read_campaign
 from core.instruments import MeasureRequest
+from core.pose_visits import next_number
 from core.session import Session
 from core.session_campaign import export_campaign
 from core.session_entries import encoded
 from core.session_events import Judged, SessionError, Solved
 from core.session_library import copy_session
-from core.session_shots import shot_at
+from core.session_shots import senses, shot_at, shot_of_pose
 from core.twin import irb_l6
 from core.twin.demo import demo_events
 from core.twin.instrument import DemoInstrument, DemoRobot
@@ -117,10 +118,22 @@ def act(session: Session, robot: DemoRobot, meter: DemoInstrument, rng: random.R
         session.append(Judged((rng.choice(state.shots).id,), "excluded", "killed for it"))
     elif dice < 0.4:
         session.append(Solved("0" * 64, len(state.shots), "test", {"noise_mm": 0.2}))
+    elif dice < 0.5:
+        visit(session, robot, meter, rng)
     else:
         step = step or rng.choice(state.steps)
         robot.move_to(step.commanded, lambda: False)
         session.append(shot_at(step, meter.measure(MeasureRequest(step.target, step.commanded), lambda: False)))
+
+
+def visit(session: Session, robot: DemoRobot, meter: DemoInstrument, rng: random.Random) -> None:
+    """One shot at a test pose, by nominal or by other commands."""
+    wanted, target = rng.choice(session.state.poses.wanted), rng.choice(session.state.poses.targets)
+    commanded, before = (wanted[0] + rng.choice((0.0, 0.01)), *wanted[1:]), robot.commanded
+    robot.move_to(commanded, lambda: False)
+    seen = meter.measure(MeasureRequest(target, commanded), lambda: False)
+    number, approach = next_number(session.state), senses(before, commanded)
+    session.append(shot_of_pose(number, target, commanded, wanted, approach, seen))
 
 
 def examine(folder: Path, path: Path, number: int, told: list[bytes], summary: Summary, known: dict) -> None:
