@@ -28,7 +28,7 @@ from app.panels.seat import Seat
 from app.panels.solve import SolvePanel
 from app.panels.start import StartPanel
 from app.panels.view import ViewPanel
-from app.scene.cameras import fly_to
+from app.scene.cameras import Camera, fly_to
 from app.spots import spot_named
 from app.uploads import guard_uploads
 from app.verify_tabs import VerifyTabs
@@ -141,6 +141,8 @@ class Dashboard:
             self._draw_page()
             if self._dark:
                 self.view.tick_dark()
+        for client in self.server.get_clients().values():
+            fly_to(client, self._first_camera(), seconds=0.0)
 
     def _show_all(self) -> None:
         with self.server.atomic():
@@ -176,9 +178,11 @@ class Dashboard:
 
     def _look_at_the_cell(self) -> None:
         """What a browser sees first: the arm, with its instruments behind."""
-        camera = next(c for c in self.cell.cameras() if c.name == "Arm")
-        first = self.server.initial_camera
+        camera, first = self._first_camera(), self.server.initial_camera
         first.position, first.look_at, first.up = (tuple(v) for v in (camera.position_m, camera.look_at_m, camera.up))
+
+    def _first_camera(self) -> Camera:
+        return next(camera for camera in self.cell.cameras() if camera.name == "Arm")
 
     def _think_ahead(self) -> None:
         """While nobody waits: draw what nobody looks at yet, and have the next solution at hand."""

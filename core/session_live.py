@@ -15,6 +15,7 @@ from core.robot import Robot
 from core.session_plan import Step
 from core.session_state import Shot, State
 
+INSTRUMENT_HEIGHT_M = 1.5
 _SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
@@ -106,8 +107,8 @@ def _rough_place(state: State, robot: Robot) -> Array:
     shot = next(seen, None)
     reach = float(np.linalg.norm(robot.link_transforms[:, :3, 3], axis=1).sum())
     if shot is None:
-        # In front of the instrument, at about its height.
-        return np.array([1.0 + 1.5 * reach, 0.0, -0.5 * reach])
+        # In front of the instrument, on the floor under it.
+        return np.array([1.0 + 1.5 * reach, 0.0, -INSTRUMENT_HEIGHT_M])
     frames = link_frames(robot, _net(state, robot, shot.taken.commanded)[None])[0]
     return np.array(shot.taken.point_m) - frames[state.target_links[shot.taken.target], :3, 3]
 

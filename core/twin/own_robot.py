@@ -30,6 +30,8 @@ OF_PRIOR = 0.03
 SIGMA_M = 5e-5
 """Of an instrument that promises nothing."""
 LEAST_REACH_M = 0.3
+INSTRUMENT_HEIGHT_M = 1.5
+"""Of the instrument above the floor on which the robot stands."""
 SECONDS_A_SHOT = 20.0
 
 
@@ -96,9 +98,9 @@ def reach_of(robot: Robot) -> float:
 
 
 def _base(robot: Robot) -> Array:
-    """From the robot's base frame to the instrument's, (4, 4): in front of it, turned, a little below."""
+    """From the robot's base frame to the instrument's, (4, 4): in front of it, turned, on the same floor."""
     reach = reach_of(robot)
-    return transform(rotation_about([0.0, 0.0, 1.0], 0.6), [1.2 * reach + 1.0, 0.9 * reach + 0.4, -0.3 * reach])
+    return transform(rotation_about([0.0, 0.0, 1.0], 0.6), [1.2 * reach + 1.0, 0.9 * reach + 0.4, -INSTRUMENT_HEIGHT_M])
 
 
 def _off(line: Line, rng: np.random.Generator) -> Line:
