@@ -20,7 +20,7 @@ from core.geometry import Array
 SMOOTH = frozenset({"zero_offset", "ratio", "eccentricity", "linkage", "axis_wobble", "geometry"})
 """Smooth functions of one joint; so is a mesh with fewer waves a turn than ``RIPPLE``."""
 RIPPLE = 6.0
-EXACT, EXACTLY = frozenset({"zero_offset", "ratio", "eccentricity", "mesh"}), 0.98
+EXACT, EXACTLY = frozenset({"zero_offset", "ratio", "eccentricity", "mesh"}), 0.96
 """Smooth effects whose forms are exact must close nearly all: whatever is smooth looks like them otherwise."""
 LOCALLY, GLOBALLY = 0.92, 0.75
 """Shares of what nameless functions close that a name must close to stand."""

@@ -91,9 +91,16 @@ def where_words(place: Place) -> str:
     return since or (f"of {OF_ALL[place.effect]}" if place.effect in OF_ALL else "")
 
 
+MOST_WORDS = 3
+"""Places of a class that a sentence names; the rest is counted."""
+
+
 def either_of(places: Iterable[Place]) -> str:
-    """Places of a class: ``backlash of joint 3 or hysteresis of joint 3``."""
-    return listed([place_words(place) for place in places], "or")
+    """Places of a class: ``backlash of joint 3 or hysteresis of joint 3``; of a large one the first few."""
+    words = [place_words(place) for place in places]
+    if len(words) > MOST_WORDS + 1:
+        words = [*words[:MOST_WORDS], f"one of {len(words) - MOST_WORDS} more"]
+    return listed(words, "or")
 
 
 def cause_words(cause: Cause) -> str:
