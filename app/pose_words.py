@@ -9,6 +9,7 @@ from app.clicks import listening, saying
 from app.pose_bench import NextVisit, TestPose
 from app.words import block
 from core.pose_loop import Attempts, PoseLoop
+from core.repeatability import RepeatedPose, repeated_poses
 from core.robot import Robot
 from core.verification import Errors, overall, pose_verdicts
 from core.wording import decimals_for, fixed
@@ -65,7 +66,7 @@ def summary_words(loop: PoseLoop | None, why_not: str, poses: tuple[TestPose, ..
     rows = "".join(
         f"<tr><td>{name}</td>{_mean_cell(attempts.errors.position)}"
         f"{_mean_cell(attempts.errors.orientation)}<td class='n'>{attempts.count}</td></tr>"
-        for name, attempts in (("nominal", loop.nominal), ("compensated", loop.compensated))
+        for name, attempts in _ways(loop)
         if attempts.count
     )
     head = "<tr><th>Mean error</th><th class='n'>mm</th><th class='n'>mrad</th><th class='n'>poses</th></tr>"
@@ -76,6 +77,32 @@ def summary_words(loop: PoseLoop | None, why_not: str, poses: tuple[TestPose, ..
     if any(pose.outdated for pose in poses):
         text += "<p class='doubt'>Some compensated poses were commanded by an earlier solution; measure them again.</p>"
     return block(text, "verify-summary")
+
+
+def iso_words(loop: PoseLoop | None, numbers: dict[int | None, int]) -> str:
+    """Accuracy and repeatability of poses that were visited more than once, as ISO 9283 defines them.
+
+    Args:
+        loop: what came of the poses.
+        numbers: what each wanted pose is called, by its index in the loop.
+    """
+    repeated = () if loop is None else repeated_poses(loop.found)
+    if loop is None or not repeated:
+        return block("", "pose-iso")
+    goals = {
+        int(loop.found.measured.seen.pose[a.row[k]]): (int(a.goal[k]), name)
+        for name, a in _ways(loop)
+        for k in range(a.count)
+    }
+    rows = "".join(_iso_row(one, *goals[one.poses[0]], numbers) for one in repeated)
+    heads = ("visits", "AP, mm", "RP, mm", "AP, mrad", "RP, mrad")
+    head = "<tr><th>Pose, command</th>" + "".join(f"<th class='n'>{name}</th>" for name in heads) + "</tr>"
+    note = (
+        "<p class='soft'>ISO 9283: AP, from the wanted pose to the mean of the visits; RP, mean distance from that "
+        "mean and three standard deviations (of turns: three standard deviations about x, y, z). The standard asks "
+        "for 30 visits.</p>"
+    )
+    return block(f"<h3>Repeated poses</h3><table>{head}{rows}</table>{note}", "pose-iso")
 
 
 def rows_of(loop: PoseLoop | None, poses: tuple[TestPose, ...]) -> tuple[PoseRow, ...]:
@@ -173,3 +200,18 @@ def _command(robot: Robot, k: int, value: float) -> str:
 
 def _sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}."
+
+
+def _ways(loop: PoseLoop) -> tuple[tuple[str, Attempts], ...]:
+    return ("nominal", loop.nominal), ("compensated", loop.compensated)
+
+
+def _iso_row(one: RepeatedPose, goal: int, way: str, numbers: dict[int | None, int]) -> str:
+    accuracy = one.nominal if way == "nominal" else one.calibrated
+    values = (accuracy.position_m, one.repeatability_m, accuracy.orientation_rad)
+    cells = "".join(f"<td class='n'>{v * 1e3:.2f}</td>" if np.isfinite(v) else "<td class='n'>–</td>" for v in values)
+    turns = (
+        ", ".join(f"{v * 1e3:.1f}" for v in one.repeatability_rad) if np.isfinite(one.repeatability_rad).all() else "–"
+    )
+    name = f"{numbers.get(goal, goal + 1)}, {way}"
+    return f"<tr><td>{name}</td><td class='n'>{one.visits}</td>{cells}<td class='n'>{turns}</td></tr>"

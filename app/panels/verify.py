@@ -1,6 +1,7 @@
 """Verifying the arm: test poses by nominal and by compensated commands, what was measured there, before and after."""
 
 from collections.abc import Callable
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 import viser
@@ -10,13 +11,14 @@ from app.panels.plot_box import WIDTH_PX, PlotBox
 from app.panels.typed_points import TypedPoints
 from app.pose_bench import LIMITS, NextVisit, PoseBench, TestPose
 from app.pose_view import PoseView, Shown
-from app.pose_words import WORD, step_words, summary_words, table_words
+from app.pose_words import WORD, iso_words, step_words, summary_words, table_words
 from app.scene.cameras import fly_to, near
 from app.workbench import Workbench
 from core.errors import InputError
 
 if TYPE_CHECKING:
     from core.pose_loop import PoseLoop
+    from core.verification import Verification
 
 IN_TURN, NOMINAL, COMPENSATED = "nominal first, then compensated", "nominal", "compensated"
 WAYS = {IN_TURN: None, NOMINAL: False, COMPENSATED: True}
@@ -25,6 +27,7 @@ FIT = "so that it fits"
 FACTORS = (FIT, "1", "2", "5", "10", "20", "50", "100", "200", "500")
 CLOSE_M = 0.35
 """What is seen about a pose after flying there."""
+FILES = {"Verification (HTML)": "html", "Verification (JSON)": "json"}
 LABELS = {"limit_pose_mm": "Position [mm]", "limit_pose_mrad": "Orientation [mrad]"}
 
 
@@ -62,6 +65,9 @@ class VerifyPanel:
             self._count = gui.add_number("How many", 12, min=1, max=1000, step=1)
             hint = "At random within the swept ranges; poses that were measured stay."
             gui.add_button("Plan new poses", hint=hint).on_click(self._plan)
+        for label, ending in FILES.items():
+            button = gui.add_button(label, icon=viser.Icon.DOWNLOAD)
+            button.on_click(lambda event, ending=ending: self._send(event, ending))
 
     def build_plots(self, gui: viser.GuiApi) -> None:
         """Fill the tab at the right."""
@@ -69,7 +75,7 @@ class VerifyPanel:
             PlotBox(gui, "pose-positions", "Measure a test pose to see its error."),
             PlotBox(gui, "pose-orientations", ""),
         )
-        self._table = gui.add_html("")
+        self._table, self._iso = gui.add_html(""), gui.add_html("")
         self._drawn = ()
 
     def show_dark(self, dark: bool) -> None:
@@ -182,6 +188,17 @@ class VerifyPanel:
 
         self._ask(event, job)
 
+    def _send(self, event: viser.GuiEvent, ending: str) -> None:
+        def job(client: viser.ClientHandle | None) -> None:
+            loop, why = self._poses.loop()
+            if loop is None:
+                raise InputError(why)
+            if client is not None:
+                name = f"{datetime.now(UTC):%Y-%m-%d_%H%M%S}_trueaxis_verification.{ending}"
+                client.send_file_download(name, verification_file(loop.found, ending), save_immediately=True)
+
+        self._ask(event, job, operator=False)
+
     def _clicked(self, goal: int, client_id: int) -> None:
         """A place was clicked in 3-D."""
         loop = self._poses.loop()[0]
@@ -224,11 +241,12 @@ class VerifyPanel:
         if key == self._drawn:
             return
         self._drawn = key
+        numbers = {} if loop is None else {loop.goal_of(pose.wanted): pose.number for pose in poses}
+        self._iso.content = iso_words(loop, numbers)
         if loop is None:
             for box in self._plots:
                 box.clear()
             return
-        numbers = {loop.goal_of(pose.wanted): pose.number for pose in poses}
         figures = loop_figures(loop, tuple(numbers.get(k, 0) for k in range(len(loop.wanted))), WIDTH_PX)
         for box, figure in zip(self._plots, figures, strict=True):
             box.show(figure)
@@ -242,3 +260,14 @@ class VerifyPanel:
         if key != self._scene:
             self._scene = key
             self._view.show(loop, shown, factor, goal)
+
+
+def verification_file(found: "Verification", ending: str) -> bytes:
+    """The bytes of a verification: html or json."""
+    if ending == "html":
+        from app.verification_report import verification_html
+
+        return verification_html(found).encode()
+    from core.verification_json import verification_to_json
+
+    return verification_to_json(found).encode()

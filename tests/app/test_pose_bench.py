@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from app.pose_bench import PoseBench
+from app.pose_words import iso_words
 from app.rigs import SETTING, Source
 from app.workbench import Workbench
 from core.errors import InputError
 from core.instruments import InstrumentFailed
 from core.kinematics import forward, nominal_net
 from core.pose_visits import pose_visits
+from core.repeatability import repeated_poses
 from core.session import Session
 from core.session_events import PosesPlanned, SessionError, Setting
 from core.session_store import SUFFIX
@@ -248,3 +250,18 @@ def test_a_person_moves_the_robot_and_types_what_the_instrument_shows(ready):
     assert made.seen == {"T1", "T5", "T6"}
     assert made.shots[1].taken.point_m == pytest.approx((0.004, 0.005, 0.006))
     assert poses.next_visit().pose.number == 2
+
+
+def test_repeated_visits_have_a_repeatability(ready):
+    poses = PoseBench(ready)
+    pose = poses.poses()[2]
+    for _ in range(3):
+        for compensated in (False, True):
+            poses.measure(poses.visit_of(pose, compensated))
+    loop, _ = poses.loop()
+    words = iso_words(loop, {0: 3})
+    assert "<td>3, nominal</td><td class='n'>3</td>" in words
+    assert "<td>3, compensated</td><td class='n'>3</td>" in words
+    one = repeated_poses(loop.found)[0]
+    assert f"{one.repeatability_m * 1e3:.2f}" in words
+    assert iso_words(None, {}) == iso_words(None, {3: 1})

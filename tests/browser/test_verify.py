@@ -1,5 +1,6 @@
 """Verifying the demo cell's arm in a real browser: command, measure, compare, before compensation and after it."""
 
+import json
 import re
 from pathlib import Path
 
@@ -244,3 +245,23 @@ def test_methods_are_compared_on_demand_while_the_page_goes_on(page, dashboard):
     assert page.locator("[data-testid=compare-table] tr").count() == len(found.rows) + len(found.references) + 2
     tab(page, "Compare")
     wait_for_text(page, "compare-verdict", "1 trial, 12 kept-out poses each")
+
+
+def test_the_verification_is_taken_as_files(page, dashboard):
+    solve(page)
+    press(page, "Verification (JSON)")
+    page.get_by_role("alert").filter(has_text="Measure a pose to see its error").wait_for()
+    dashboard.verify._poses.run()
+    wait_for_text(page, "verify-summary", "compensated")
+    for label, ending in (("Verification (HTML)", "html"), ("Verification (JSON)", "json")):
+        with page.expect_download() as waiting:
+            press(page, label)
+        sent = waiting.value
+        assert re.fullmatch(rf"\d{{4}}-\d\d-\d\d_\d{{6}}_trueaxis_verification\.{ending}", sent.suggested_filename)
+        content = Path(sent.path()).read_text(encoding="utf-8")
+        if ending == "json":
+            loop, _ = dashboard.verify._poses.loop()
+            told = json.loads(content)["compensation"]
+            assert told["improvement_position"] == pytest.approx(loop.improvement_position)
+        else:
+            assert "Compensated commands" in content
