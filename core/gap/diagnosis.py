@@ -22,6 +22,7 @@ from core.gap.open_set import Judge, Stand, stands
 from core.gap.placement import placement_slots
 from core.gap.posterior import adequate, rivals, twins
 from core.gap.problem import Problem
+from core.gap.reliability import reliability
 from core.gap.result import (
     UNKNOWN,
     Cause,
@@ -314,7 +315,7 @@ def _report(campaign: Campaign, arm: CalibratedArm | None, found: Findings) -> D
         ),
         warnings=warnings_of(a.doings, noise),
         evidence_map=_evidence_map(found) if gap else (),
-        reliability=None,
+        reliability=reliability(a.problem, a.evidence, a.threshold) if gap else None,
         hold_out=HOLD_OUT,
         corrected=_corrected(arm, found),
     )

@@ -135,27 +135,33 @@ class Evidence:
         evidence, size = np.empty(len(groups)), np.empty(len(groups))
         for places, squares, pulls in self._conditioned(groups, chosen):
             spectrum, pulls = _spectra(squares, pulls[:, :, None])
-            evidence[places], size[places] = (part[:, 0] for part in _best(spectrum, pulls))
+            evidence[places], size[places] = (part[:, 0] for part in best_sizes(spectrum, pulls))
         return Gains(evidence, size)
 
+    @property
+    def null_pulls(self) -> Array:
+        """Pulls of draws of noise without what nuisance explains, (p, draws)."""
+        return self._eliminated[2]
+
     @cached_property
-    def all_spectra(self) -> list[tuple[np.ndarray, Array, Array]]:
-        """Group numbers, spectra and pulls of noise, for groups of one width each."""
+    def bases(self) -> list[tuple[np.ndarray, Array, Array]]:
+        """Group numbers, eigenvalues and eigenvectors of their squares, for groups of one width each."""
         out = []
         groups = np.arange(len(self.slices))
         for width in np.unique([s.stop - s.start for s in self.slices]):
             mine = np.array([g for g in groups if self.slices[g].stop - self.slices[g].start == width])
             index = np.array([np.arange(self.slices[g].start, self.slices[g].stop) for g in mine])
             squares = self.square[index[:, :, None], index[:, None, :]]
-            spectrum, pulls = _spectra(squares, self._eliminated[2][index])
-            out.append((mine, spectrum, pulls))
+            values, vectors = np.linalg.eigh((squares + np.swapaxes(squares, 1, 2)) / 2)
+            out.append((mine, np.clip(values, 0.0, None), vectors))
         return out
 
     def null_maxima(self, cost: Array) -> Array:
         """Largest log evidence less the cost of choosing, over all groups, of each draw of noise, (draws,)."""
         best = np.full(self.sums.null_pulls.shape[1], -np.inf)
-        for mine, spectrum, pulls in self.all_spectra:
-            evidence, _ = _best(spectrum, pulls)
+        for mine, spectrum, vectors in self.bases:
+            index = np.array([np.arange(self.slices[g].start, self.slices[g].stop) for g in mine])
+            evidence, _ = best_sizes(spectrum, np.swapaxes(vectors, 1, 2) @ self.null_pulls[index])
             best = np.maximum(best, (evidence - cost[mine, None]).max(axis=0))
         return best
 
@@ -185,7 +191,7 @@ def _spectra(squares: Array, pulls: Array) -> tuple[Array, Array]:
     return np.clip(values, 0.0, None), np.swapaxes(vectors, 1, 2) @ pulls
 
 
-def _best(spectrum: Array, pulls: Array) -> tuple[Array, Array]:
+def best_sizes(spectrum: Array, pulls: Array) -> tuple[Array, Array]:
     """Log evidence at the best scale, and the scale, (g, d) each."""
     power = pulls**2
     shape = (len(SIZES), *power.shape[::2])
