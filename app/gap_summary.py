@@ -31,7 +31,7 @@ def gap_summary(report: GapReport, folder: Path) -> str:
         *_listed("next", [next_sentence(one) for one in _ranked(report)], MOST_NEXT),
         *_listed("unknown", list(report.warnings), MOST_WARNINGS),
         "",
-        f"Written: {folder / 'gap.json'}, {folder / 'report.html'}",
+        f"Written: {folder / 'gap.json'}, {folder / 'corrected_points.csv'}, {folder / 'report.html'}",
     ]
     return "\n".join(lines)
 

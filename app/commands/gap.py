@@ -45,10 +45,15 @@ def run(arguments: argparse.Namespace) -> None:
         progress.share(DIAGNOSED, "drawing the report")
         from app.gap_report import gap_html
         from app.gap_summary import gap_summary
+        from core.gap.corrected_csv import corrected_to_csv
         from core.gap.gap_json import gap_to_json
 
         text = gap_to_json(report)
-        files = (OutputFile("gap.json", text), OutputFile("report.html", gap_html(report)))
+        files = (
+            OutputFile("gap.json", text),
+            OutputFile("corrected_points.csv", corrected_to_csv(report)),
+            OutputFile("report.html", gap_html(report)),
+        )
         progress.share(1.0, "writing")
         write_files(arguments.out, files)
     print_result(gap_summary(report, arguments.out), text, as_json=arguments.json)

@@ -47,7 +47,7 @@ def test_gap_writes_the_contract_and_a_report(diagnosed, tmp_path: Path, capsys)
     calls = diagnosed(gap_reports.explained())
     out = tmp_path / "deep" / "out"
     assert main(["gap", str(CAMPAIGN), "--out", str(out)]) == 0
-    assert set(contents(out)) == {"gap.json", "report.html"}
+    assert set(contents(out)) == {"gap.json", "corrected_points.csv", "report.html"}
     document = json.loads((out / "gap.json").read_text(encoding="utf-8"))
     assert (document["format"], document["verdict"]) == ("trueaxis-gap/1", "explained")
     assert (calls[0][1], calls[0][2]) == (None, None)
