@@ -135,10 +135,10 @@ class Findings:
 
     @cached_property
     def stands(self) -> list[Stand]:
-        """Named causes, the one that closes most first, then unknown ones."""
+        """Named causes, the one that the data say most for first, then unknown ones."""
         judged = self._told_stands() if self.told else [*self._geometry_stands(), *stands(self.judge)]
         named = [one for one in judged if not one.unknown]
-        order = sorted(named, key=lambda one: self.judge.square(_chosen([one])))
+        order = sorted(named, key=lambda one: self._evidence_lost(one, named), reverse=True)
         order = [one for one in order if self.told or self._matters(one, order)]
         if self.told:
             return order
@@ -147,6 +147,11 @@ class Findings:
     @cached_property
     def named(self) -> list[Stand]:
         return [one for one in self.stands if not one.unknown]
+
+    def _evidence_lost(self, stand: Stand, named: list[Stand]) -> float:
+        """What the data say for one cause when all others are given: geometry can move much that placing takes back."""
+        evidence, everything = self.analysis.evidence, joined(_chosen(named), self.analysis.given)
+        return evidence.given(everything) - evidence.given(without(everything, stand.groups))
 
     def _matters(self, stand: Stand, others: list[Stand]) -> bool:
         """Whether geometry that is fitted anyway is worth telling of."""
