@@ -31,6 +31,8 @@ GHOST_SWELL_M = 0.01
 """The ghost is that much thicker, so that it does not flicker with the arm inside it."""
 SEEN_MOVING_M = 1e-3
 """A base that is found elsewhere by less than this stays where it is drawn."""
+FAR = 0.3
+"""Share of the arm's reach by which it moves out of the picture."""
 
 
 class CellView:
@@ -41,6 +43,8 @@ class CellView:
         prepare_stage(viewer.scene)
         self._stations = tuple(Station(name, place) for name, place in bench.rig.stations)
         self._base = bench.base().base
+        self.out_of_sight = False
+        """Whether the arm was drawn elsewhere than where anybody looks."""
         self._draw_arms()
         self.points = PointsView(viewer)
         self.circle = SweepCircle(viewer)
@@ -89,6 +93,8 @@ class CellView:
         base = self._bench.base().base
         if np.abs(base - self._base).max() < SEEN_MOVING_M:
             return
+        jump = float(np.linalg.norm(base[:3, 3] - self._base[:3, 3]))
+        self.out_of_sight = self.out_of_sight or jump > FAR * self.arm.bones.reach_m
         self._base, ghost = base, self.ghost.visible
         for view in (self.arm, self.ghost, self.stations):
             view.remove()

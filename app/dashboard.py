@@ -133,6 +133,8 @@ class Dashboard:
         """Draw everything anew from the session; the whole page where the robot is another one."""
         if self.bench.rig.robot is self._drawn_for:
             self._show_all()
+            if self.cell.out_of_sight:
+                self._look_again()
             return
         self.verify.stop()
         with self.server.atomic():
@@ -141,8 +143,7 @@ class Dashboard:
             self._draw_page()
             if self._dark:
                 self.view.tick_dark()
-        for client in self.server.get_clients().values():
-            fly_to(client, self._first_camera(), seconds=0.0)
+        self._look_again()
 
     def _show_all(self) -> None:
         with self.server.atomic():
@@ -180,6 +181,12 @@ class Dashboard:
         """What a browser sees first: the arm, with its instruments behind."""
         camera, first = self._first_camera(), self.server.initial_camera
         first.position, first.look_at, first.up = (tuple(v) for v in (camera.position_m, camera.look_at_m, camera.up))
+
+    def _look_again(self) -> None:
+        """Bring all browsers to where the arm is now."""
+        self.cell.out_of_sight = False
+        for client in self.server.get_clients().values():
+            fly_to(client, self._first_camera(), seconds=0.0)
 
     def _first_camera(self) -> Camera:
         return next(camera for camera in self.cell.cameras() if camera.name == "Arm")

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 UP = np.array([0.0, 0.0, 1.0])
 FIELD_OF_VIEW_RAD = 0.75
 """Upright; a long lens, because wide ones make lengths look wrong."""
+WIDTH_OF_HEIGHT = 0.75
+"""How wide the picture is, as a share of its height: between the panels of a screen of 1440 x 860, margins taken off."""
 FRAMES_A_SECOND = 25
 
 
@@ -101,8 +103,7 @@ def around(name: str, points_m: Array, direction: Array, margin: float = 1.0) ->
     right = right / np.linalg.norm(right)
     over = cross(away, right)
     offsets = points_m - middle
-    # A screen is at least 1.2 times as wide as high once the panels at its sides are taken off.
-    size = np.maximum(np.abs(offsets @ over), np.abs(offsets @ right) / 1.2)
+    size = np.maximum(np.abs(offsets @ over), np.abs(offsets @ right) / WIDTH_OF_HEIGHT)
     distance = np.max(margin * size / np.tan(FIELD_OF_VIEW_RAD / 2) + offsets @ away)
     return Camera(name, middle + max(float(distance), 0.3) * away, middle, UP)
 
