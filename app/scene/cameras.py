@@ -19,7 +19,7 @@ UP = np.array([0.0, 0.0, 1.0])
 FIELD_OF_VIEW_RAD = 0.75
 """Upright; a long lens, because wide ones make lengths look wrong."""
 WIDTH_OF_HEIGHT = 0.75
-"""How wide the picture is, as a share of its height: between the panels of a screen of 1440 x 860, margins taken off."""
+"""How wide the picture is, as a share of its height: between the panels of a screen of 1440 x 860, roughly."""
 FRAMES_A_SECOND = 25
 
 
