@@ -11,7 +11,7 @@ from core.gap.doings import Doings, doings
 from core.gap.effects.candidate import Candidate
 from core.gap.evidence import Chosen, Evidence, joined
 from core.gap.folds import blocks
-from core.gap.kept_out import KeptOut
+from core.gap.kept_out import KNOWN, KeptOut
 from core.gap.library import candidates
 from core.gap.observations import Observations
 from core.gap.placement import place, placement_slots, with_placement
@@ -209,7 +209,8 @@ def _best_prior(problem: Problem, floor_m2: float) -> tuple[Evidence, float, flo
     if not _geometry_strays(problem):
         return calibrated
     drawn = _with_geometry(problem)
-    left, with_geometry = (_kept_out_m2(problem, one) for one in (calibrated, drawn))
+    # As drawn: data enough overcome any prior, and what is fitted along must not hide what is off.
+    left, with_geometry = _kept_out_m2(problem, calibrated, KNOWN), _kept_out_m2(problem, drawn, AS_CALIBRATED)
     return drawn if left > FAR_LEFT * floor_m2 and with_geometry < GEOMETRY_CLOSES * left else calibrated
 
 
@@ -228,9 +229,9 @@ def _geometry_strays(problem: Problem) -> bool:
     return bool(np.sum(strays**2) > STRAY**2 * len(strays))
 
 
-def _kept_out_m2(problem: Problem, found: tuple[Evidence, float, float, Found, Chosen]) -> float:
-    """What a hypothesis leaves of kept-out points, m^2."""
-    _, prior, _, names, given = found
+def _kept_out_m2(problem: Problem, found: tuple[Evidence, float, float, Found, Chosen], prior: float) -> float:
+    """What a hypothesis leaves of kept-out points where geometry beside it is known to so much, m^2."""
+    _, _, _, names, given = found
     everything = joined(given, names.worth)
     return KeptOut(problem, blocks(problem.sim.seen), prior, everything.groups).square_m2(everything)
 

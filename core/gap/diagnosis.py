@@ -377,10 +377,20 @@ def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, 
         return UNKNOWN_PROBABILITY, (stand.place,)
     if found.told:
         return 1.0, (stand.place,)
+    if stand.groups[0] in found.analysis.given.groups:
+        # The geometry as a whole is settled by points kept out; this is about the one frame.
+        return _significance(found, stand), (stand.place,)
     probability, alike = twins(stand, rivals(found.judge, stand, joined(others, found.analysis.found.worth)))
     if len(found.named) == len(found.stands):
         return probability, alike
     return probability * adequate(found.judge, _chosen(found.named), _chosen(found.stands)), alike
+
+
+def _significance(found: Findings, stand: Stand) -> float:
+    """Probability that a cause does anything at all, when everything else is given."""
+    a = found.analysis
+    rest = without(joined(a.given, a.found.worth), stand.groups)
+    return float(1 / (1 + np.exp(-a.evidence.gains(np.array(stand.groups), rest).evidence[0])))
 
 
 def _parameters(found: Findings, stand: Stand) -> tuple[Parameter, ...]:
