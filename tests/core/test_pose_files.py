@@ -138,7 +138,7 @@ def test_poses_may_be_pasted_with_tabs_as_spreadsheets_copy_them() -> None:
     for pasted in (text, text.replace(",", "\t"), text.replace("\n", "\r\n") + "\r\n"):
         found = poses_of_bytes(pasted.encode(), "pasted poses", nominal_robot())
         np.testing.assert_allclose(found.poses, poses, rtol=0, atol=1e-12)
-    with pytest.raises(CampaignError, match="^pasted poses, row 3, column y_mm: 'here', expected a number"):
+    with pytest.raises(CampaignError, match=r"^pasted poses, row 3, column y_mm: 'here', expected a number"):
         poses_of_bytes(f"{header}\n1,2,3,1,0,0,0\n1,here,3,1,0,0,0\n".encode(), "pasted poses", nominal_robot())
     for data, words in ((b"", "is empty"), (b"\xff", "is not UTF-8"), (b"x" * 9_000_000, "9.0 MB, expected at most 8")):
         with pytest.raises(CampaignError, match=words):
