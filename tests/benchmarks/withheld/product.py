@@ -36,7 +36,6 @@ def own_product() -> Product:
     """The diagnosis of this project."""
     from core.gap.corrected import realised_closure
     from core.gap.diagnosis import diagnose
-
     from core.gap.gap_json import gap_to_json
 
     return Product(diagnose, gap_to_json, realised_closure)
