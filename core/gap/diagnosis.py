@@ -2,7 +2,7 @@
 
 import resource
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -96,7 +96,7 @@ def diagnose(
     )
 
 
-def _only(told: Sequence[dict[str, object]]):
+def _only(told: Sequence[dict[str, object]]) -> Callable[[Candidate], bool]:
     def wanted(candidate: Candidate) -> bool:
         return any(_is(candidate.place, answer) for answer in told)
 

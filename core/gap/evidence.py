@@ -5,7 +5,7 @@ a group of one column and a group of sixty compete on equal terms (automatic Occ
 10.1162/neco.1992.4.3.415). Placement and geometry are integrated out first.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -165,7 +165,7 @@ class Evidence:
             best = np.maximum(best, (evidence - cost[mine, None]).max(axis=0))
         return best
 
-    def _conditioned(self, groups: np.ndarray, chosen: Chosen):
+    def _conditioned(self, groups: np.ndarray, chosen: Chosen) -> Iterator[tuple[np.ndarray, Array, Array]]:
         """Squares and pulls of groups of one width at a time, what is chosen taken out."""
         if chosen.groups:
             index = self.index(chosen.groups)

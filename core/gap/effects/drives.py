@@ -1,5 +1,6 @@
 """What a drive makes of its command: zero offset, ratio, once a turn, many times a turn, four-bar, another's motion."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -88,7 +89,7 @@ def _turned(doings: Doings) -> list[int]:
     return [j for j in motors(doings) if not doings.seen.chain.sliding[j]]
 
 
-def _drive(effect: str, joint: int, name: str, feature) -> Candidate:
+def _drive(effect: str, joint: int, name: str, feature: Callable[[Array], Array]) -> Candidate:
     def columns(doings: Doings) -> list[Column]:
         return [drive(doings, joint, feature(doings.active[:, joint]))]
 

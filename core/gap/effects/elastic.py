@@ -1,5 +1,6 @@
 """What weights do: drives give, links bend and twist, and the tool carries more than the sim thinks."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,8 @@ from core.gap.result import Place
 from core.gap.sim import Part, Slot
 from core.geometry import Array
 
+Load = Callable[[Doings], Array]
+"""What turns one motor at every point, N m or N, (m,)."""
 ROUGHLY = 0.3
 """How far off masses may well be, as a share."""
 NEAR_M = 0.1
@@ -95,23 +98,23 @@ def _generous_compliance(doings: Doings, joint: int) -> Candidate:
     return replace(plain, names=names, columns=columns, reference=(one, rough, rough, near, near, near))
 
 
-def _loaded(load, joint: int) -> bool:
+def _loaded(load: Array, joint: int) -> bool:
     return bool(np.ptp(load[:, joint]) > LEAST_SHARE * max(float(np.abs(load).max()), 1e-9))
 
 
-def _from_weights(joint: int):
+def _from_weights(joint: int) -> Load:
     return lambda doings: doings.drive_load[:, joint]
 
 
-def _reported(joint: int):
-    def torque(doings: Doings):
+def _reported(joint: int) -> Load:
+    def torque(doings: Doings) -> Array:
         logged = doings.logged("torque_nm")
         return np.zeros(doings.count) if logged is None else logged[:, joint]
 
     return torque
 
 
-def _compliance(doings: Doings, joint: int, atom: str, load) -> Candidate:
+def _compliance(doings: Doings, joint: int, atom: str, load: Load) -> Candidate:
     of, force = unit(doings, joint), "n" if doings.seen.chain.sliding[joint] else "nm"
     largest = max(float(np.abs(load(doings)).max()), 1e-9)
 

@@ -1,15 +1,20 @@
 """What is built otherwise than drawn, or moves as it should not: geometry, axes that wobble, links that grow."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from core.gap.doings import Doings
 from core.gap.effects.candidate import ANGLE, LENGTH, Candidate, Column, motors
 from core.gap.result import Place
 from core.gap.sim import Part, Slot
+from core.geometry import Array
 
 LINK_NAMES = ("turn_about_x_rad", "turn_about_y_rad", "shift_along_x_m", "shift_along_y_m", "shift_along_z_m")
 LINK_AXES = (0, 1, 3, 4, 5)
 """A turn about z is the zero offset of the joint."""
+Law = Callable[[Doings], Array]
+"""A rise of temperature at every point, K, or how warm something is, 0..1, (m,)."""
 WARM_UP_SHARES = (0.1, 0.3, 1.0)
 """Time constants of warming up, as shares of the whole time."""
 
@@ -70,7 +75,7 @@ def _wobble(joint: int, axes: tuple[int, ...]) -> Candidate:
     return Candidate(Place("axis_wobble", joint=joint + 1), atom, names, columns, 3, reference)
 
 
-def _warmings(doings: Doings) -> list[tuple[str, object]]:
+def _warmings(doings: Doings) -> list[tuple[str, Law]]:
     """Temperatures above the first one, or what time since the start makes of itself."""
     out = []
     for column, name in (("arm_temperature_c", "arm"), ("temperature_c", "air")):
@@ -84,23 +89,23 @@ def _warmings(doings: Doings) -> list[tuple[str, object]]:
     return out
 
 
-def _above(column: str, first: float):
-    def rise(doings: Doings):
+def _above(column: str, first: float) -> Law:
+    def rise(doings: Doings) -> Array:
         logged = doings.logged(column)
         return np.zeros(doings.count) if logged is None else logged - first
 
     return rise
 
 
-def _warming(constant_s: float):
-    def rise(doings: Doings):
+def _warming(constant_s: float) -> Law:
+    def rise(doings: Doings) -> Array:
         elapsed = doings.elapsed_s
         return np.zeros(doings.count) if elapsed is None else 1.0 - np.exp(-elapsed / constant_s)
 
     return rise
 
 
-def _thermal(links: list[int], everywhere: bool, law_name: str, law, laws: int) -> Candidate:
+def _thermal(links: list[int], everywhere: bool, law_name: str, law: Law, laws: int) -> Candidate:
     def columns(doings: Doings) -> list[Column]:
         rise = law(doings)
         steps = doings.seen.chain.link_transforms[:, :3, 3]
