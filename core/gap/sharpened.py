@@ -9,6 +9,7 @@ import numpy as np
 from core.gap.doings import Doings
 from core.gap.effects import drives, instrument
 from core.gap.effects.candidate import Candidate, motors
+from core.gap.library import joint_alone
 from core.gap.sim import Part, Sim, Slot
 from core.geometry import Array
 
@@ -18,9 +19,11 @@ SPECTRUM_BINS = 1 << 18
 """Over the span of a joint."""
 PEAK = 20.0
 """A line of the spectrum must stand so many times above its neighbourhood."""
-ALIKE, LENGTH_MARGIN, MOST_TRIED = 0.7, 0.25, 6
-"""Waves of at least so much of the greatest power may be it, if their length is right to so much."""
+ALIKE, MOST_TRIED, MOST_TRIED_ALIKE = 0.8, 6, 3
+"""Waves of at least so much of the greatest power may be the steps', as many of them are tried."""
+SHARES = (0.5, 1.6)
 STEPS_AROUND, ALIKE_AROUND = 41, 61
+PHASES_AROUND = 17
 PHASES = tuple(float(phase) for phase in np.arange(8) / 8)
 
 
@@ -50,29 +53,32 @@ def sharpened(
 
 
 def encoder_steps(sim: Sim, doings: Doings, left_m: Array, weight: Array) -> list[Candidate]:
-    """Steps of encoders whose saw-teeth stand out of residuals: of one joint after the other, and of all alike."""
+    """Steps of encoders whose saw-teeth stand out of residuals: of motors, or of joints that are driven by two."""
+    out = _steps_of(sim, doings, Part.DRIVE, left_m, weight)
+    if doings.seen.chain.coupling_gains.any():
+        out += [joint_alone(one) for one in _steps_of(sim, doings.uncoupled, Part.JOINT, left_m, weight)]
+    return out
+
+
+def _steps_of(sim: Sim, doings: Doings, part: Part, left_m: Array, weight: Array) -> list[Candidate]:
+    """Steps of one joint after the other, of those together, and of all alike."""
     spectra = []
     for joint in motors(doings):
-        field = sim.fields([Slot(Part.DRIVE, joint)])[:, :, 0]
+        field = sim.fields([Slot(part, joint)])[:, :, 0]
         strength = weight * np.sum(field**2, axis=1)
         if strength.max() > 0:
             sliding = bool(doings.seen.chain.sliding[joint])
             error = weight * np.sum(field * left_m, axis=1)
             spectra.append(Spectrum(joint, sliding, doings.active[:, joint], error, strength))
-    out = []
-    for spectrum in spectra:
-        found = spectrum.steps()
-        if found is not None:
-            out.append(drives.quantisation(doings, {spectrum.joint: found}))
+    single = {one.joint: found for one in spectra if (found := one.steps()) is not None}
+    out = [{joint: found} for joint, found in single.items()]
+    if len(single) > 1:
+        out.append(single)
     turning = [spectrum for spectrum in spectra if not spectrum.sliding]
-    alike = common_steps(turning) if len(turning) > 1 else None
-    if alike is not None:
-        out.append(drives.quantisation(doings, alike))
-    if len(out) > 1:
-        single = {j: step for one in out for j, step in one.steps.items() if len(one.steps) == 1}
-        if len(single) > 1:
-            out.append(drives.quantisation(doings, single))
-    return out
+    if len(turning) > 1:
+        sizes = {single[one.joint][0] for one in turning if one.joint in single}
+        out += [alike for alike in (common_steps(turning), *(_alike(turning, size) for size in sizes)) if alike]
+    return [drives.quantisation(doings, steps) for steps in out]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,30 +97,51 @@ class Spectrum:
     def span(self) -> float:
         return float(np.ptp(self.x))
 
-    @cached_property
-    def power(self) -> Array:
-        """Of each wave, in units of what noise makes of it, (SPECTRUM_BINS + 1,); wave k: k / (2 span) in a unit."""
+    def _waves(self, values: Array) -> Array:
+        """Sum of values times exp(-2 pi i wave x) for each wave, (SPECTRUM_BINS + 1,)."""
         bins = np.minimum(((self.x - self.x.min()) / self.span * SPECTRUM_BINS).astype(int), SPECTRUM_BINS - 1)
-        power = np.abs(np.fft.rfft(np.bincount(bins, self.error, 2 * SPECTRUM_BINS))) ** 2
-        wave = np.arange(len(power)) / (2 * self.span)
-        coarsest = COARSEST_STEP_M if self.sliding else COARSEST_STEP_RAD
-        # Steps finer than eight bins are blurred; coarse ones are other effects.
-        power[(wave < 1 / coarsest) | (np.arange(len(power)) > SPECTRUM_BINS // 4)] = 0.0
-        return power / max(float(np.sum(self.error**2)), 1e-300)
+        return np.fft.rfft(np.bincount(bins, values, 2 * SPECTRUM_BINS))
 
     @cached_property
-    def pull(self) -> Array:
-        """Of each wave on the errors, like ``power``, without its unit."""
-        return np.sqrt(self.power * float(np.sum(self.error**2)))
+    def wave(self) -> Array:
+        """Waves that are looked at, in a unit of x, (SPECTRUM_BINS // 4 + 1,): finer steps would be blurred."""
+        return np.arange(SPECTRUM_BINS // 4 + 1) / (2 * self.span)
+
+    @cached_property
+    def _weighed(self) -> Array:
+        """Sum of the weights times each wave over their sum; what is constant in errors, placement has taken up."""
+        return self._waves(self.strength)[: len(self.wave)] / self.strength.sum()
+
+    @cached_property
+    def _pull(self) -> Array:
+        return self._waves(self.error)[: len(self.wave)] - self.error.sum() * self._weighed
+
+    @cached_property
+    def power(self) -> Array:
+        """Of each wave, in units of what noise makes of it; 0 where steps would be so coarse as to be other effects."""
+        power = np.abs(self._pull) ** 2 / max(float(np.sum(self.error**2)), 1e-300)
+        coarsest = COARSEST_STEP_M if self.sliding else COARSEST_STEP_RAD
+        return np.where(self.wave < 1 / coarsest, 0.0, power)
+
+    @cached_property
+    def amplitude(self) -> Array:
+        """Of each wave when it is fitted to the errors beside a constant, rad or m."""
+        whole, twice = float(self.strength.sum()), self._waves(self.strength)[: 2 * len(self.wave) : 2]
+        once = self._weighed
+        cosines = (whole + twice.real) / 2 - whole * once.real**2
+        sines = (whole - twice.real) / 2 - whole * once.imag**2
+        both = -twice.imag / 2 + whole * once.real * once.imag
+        cosine, sine = self._pull.real, -self._pull.imag
+        determinant = np.maximum(cosines * sines - both**2, 1e-6 * whole**2)
+        return np.hypot(sines * cosine - both * sine, cosines * sine - both * cosine) / determinant
 
     def steps(self) -> tuple[float, float] | None:
         """Size and phase of the steps that stand out; None: none."""
         if self.span < 4 * (COARSEST_STEP_M if self.sliding else COARSEST_STEP_RAD) / 3:
             return None
-        wave = np.arange(len(self.power)) / (2 * self.span)
-        places = _whole_steps(wave, self.power, self.pull, float(self.strength.sum()), PEAK)
-        best = max((self.saw_near(1 / wave[k]) for k in places), default=(0.0,))
-        return best[1:] if best[0] > 0 else None
+        places = _whole_steps(self.wave, self.power, self.amplitude, PEAK, MOST_TRIED)
+        best = max((self.saw_near(1 / self.wave[k]) for k in places), default=(0.0, 0.0))
+        return (best[1], self.sharp_phase(best[1])) if best[0] > 0 else None
 
     def saw_near(self, step: float) -> tuple[float, float, float]:
         """The best explained energy near a size of steps, with the size and the phase."""
@@ -129,53 +156,66 @@ class Spectrum:
         """Energy that steps of a size explain at their best phase, and that phase."""
         return max((self.explained(step, phase), phase) for phase in PHASES)
 
-    def explained(self, step: float, phase: float) -> float:
-        """Energy that whole steps explain; negative where they would be too much, or turned round.
+    def sharp_phase(self, step: float) -> float:
+        """The best phase of steps of a size, as finely as points can tell."""
+        best, width = self.best_phase(step), 1 / len(PHASES)
+        for _ in range(2):
+            near = best[1] + width * np.linspace(-1, 1, PHASES_AROUND)
+            best = max(best, *((self.explained(step, phase), float(phase)) for phase in near))
+            width /= 8
+        return best[1]
 
-        A share of coarser steps may look alike at the few places where a joint stood, and is none.
+    def explained(self, step: float, phase: float) -> float:
+        """Energy that steps explain; 0 where a share of them does that is far from one.
+
+        Such a share of other steps may look alike at the few places where a joint stood, and is none.
         """
         teeth = drives.saw(self.x, step, phase)
-        return float(2 * (teeth @ self.error) - teeth**2 @ self.strength)
+        teeth -= teeth @ self.strength / self.strength.sum()
+        pull, square = float(teeth @ self.error), max(float(teeth**2 @ self.strength), 1e-300)
+        return pull**2 / square if SHARES[0] < pull / square < SHARES[1] else 0.0
 
 
-def _whole_steps(wave: Array, power: Array, pull: Array, strength: float, peak: float) -> np.ndarray:
-    """Waves that stand out with the amplitude that whole steps of their length have, a few of the strongest.
+def _whole_steps(wave: Array, power: Array, amplitude: Array, peak: float, most: int) -> np.ndarray:
+    """The wave that stands out most, and such as do nearly so and have the amplitude of whole steps of their length.
 
     Where a joint stood at few places, steps of many lengths look alike but for that: a saw-tooth of steps s has a
     fundamental wave of amplitude s / pi.
     """
-    strongest = int(np.argmax(power))
-    if not power[strongest] > peak:
-        return np.zeros(0, dtype=int)
-    expected = strength / (2 * np.pi * pull[strongest])
-    fits = (power > ALIKE * power[strongest]) & (np.abs(wave / expected - 1) < LENGTH_MARGIN)
-    high = np.flatnonzero(fits)
-    return high[np.argsort(power[high])[::-1][:MOST_TRIED]]
+    high = np.flatnonzero(power > max(peak, ALIKE * power.max()))
+    off = np.abs(np.log(np.maximum(np.pi * wave[high] * amplitude[high], 1e-300)))
+    return np.unique([*high[np.argsort(off)[: most - 1]], *high[np.argsort(power[high])[-1:]]]).astype(int)
 
 
 def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | None:
     """One size of steps for all turning joints, by the sum of their spectra; None: none stands out."""
-    longest = max(spectrum.span for spectrum in spectra)
-    waves = np.arange(1, SPECTRUM_BINS // 4) / (2 * longest)
-    total, pull = np.zeros(len(waves)), np.zeros(len(waves))
+    longest = max(spectra, key=lambda spectrum: spectrum.span)
+    waves = longest.wave
+    total, amplitude, whole = np.zeros(len(waves)), np.zeros(len(waves)), 0.0
     for spectrum in spectra:
-        place = np.minimum(np.rint(waves * 2 * spectrum.span).astype(int), SPECTRUM_BINS)
+        place = np.rint(waves * 2 * spectrum.span).astype(int)
+        strength = float(spectrum.strength.sum())
         total += spectrum.power[place]
-        pull += spectrum.pull[place]
-    strength = sum(float(spectrum.strength.sum()) for spectrum in spectra)
-    places = _whole_steps(waves, total, pull, strength, PEAK + 2 * len(spectra))
-    best = max((_alike_near(spectra, 1 / waves[k]) for k in places), key=lambda found: found[0], default=(0.0, {}))
-    return best[1] if best[0] > 0 else None
+        amplitude += strength * spectrum.amplitude[place]
+        whole += strength
+    places = _whole_steps(waves, total, amplitude / whole, PEAK + 2 * len(spectra), MOST_TRIED_ALIKE)
+    best = max((_alike_near(spectra, 1 / waves[k]) for k in places), default=(0.0, 0.0))
+    return _alike(spectra, best[1]) if best[0] > 0 else None
 
 
-def _alike_near(spectra: list[Spectrum], step: float) -> tuple[float, dict[int, tuple[float, float]]]:
-    """Steps of one size, counted alike, near a size: the energy that they explain, and size and phase by joint."""
+def _alike(spectra: list[Spectrum], size: float) -> dict[int, tuple[float, float]]:
+    """Steps of one size for all, at the best phase of each."""
+    return {spectrum.joint: (size, spectrum.sharp_phase(size)) for spectrum in spectra}
+
+
+def _alike_near(spectra: list[Spectrum], step: float) -> tuple[float, float]:
+    """Steps of one size, counted alike, near a size: the energy that they explain, and the size."""
     farthest = max(float(np.abs(spectrum.x).max()) for spectrum in spectra)
     best = (0.0, step)
     for width in (step**2 / min(spectrum.span for spectrum in spectra), step**2 / farthest):
         for size in best[1] + width * np.linspace(-1, 1, ALIKE_AROUND):
             best = max(best, (sum(spectrum.best_phase(size)[0] for spectrum in spectra), float(size)))
-    return best[0], {spectrum.joint: (best[1], spectrum.best_phase(best[1])[1]) for spectrum in spectra}
+    return best
 
 
 def _neighbours(doings: Doings, one: Candidate, other: Candidate) -> bool:
