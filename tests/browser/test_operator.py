@@ -56,7 +56,7 @@ def test_a_run_is_paused_gone_on_with_and_stopped(page, dashboard):
     wait_for_text(page, "run", "The robot runs the whole plan")
     group(page, "Undo")
     alert(page, "The robot is running")
-    page.locator("canvas[data-engine]").click(position={"x": 20, "y": 20})
+    page.locator("canvas[data-engine]").click(position={"x": 40, "y": 600})
     page.keyboard.press("p")
     wait_for_text(page, "run", "Paused")
     taken = len(dashboard.bench.state.shots)
@@ -185,7 +185,7 @@ def test_the_seat_is_asked_for_refused_given_and_kept_over_a_reload(chromium, da
 
 
 def test_help_opens_on_a_key_and_terms_explain_themselves(page):
-    page.locator("canvas[data-engine]").click(position={"x": 20, "y": 20})
+    page.locator("canvas[data-engine]").click(position={"x": 40, "y": 600})
     page.keyboard.press("h")
     dialog = page.get_by_role("dialog")
     dialog.wait_for()
@@ -200,7 +200,7 @@ def test_help_opens_on_a_key_and_terms_explain_themselves(page):
 def test_keys_do_what_the_list_says(page, dashboard):
     bench = dashboard.bench
     tab(page, "2 Measure")
-    page.locator("canvas[data-engine]").click(position={"x": 20, "y": 20})
+    page.locator("canvas[data-engine]").click(position={"x": 40, "y": 600})
     for key, words in (("Space", "stop 2 of"), ("Enter", "stop 3 of"), ("k", "stop 4 of"), ("Backspace", "stop 3 of")):
         page.keyboard.press(key)
         wait_for_text(page, "step", words)
