@@ -40,10 +40,10 @@ def sharpened(
     out = []
     for candidate, own in zip(chosen, own_m, strict=True):
         place = candidate.place
-        if place.effect == "mesh" and place.joint is not None and not doings.seen.chain.sliding[place.joint - 1]:
+        if drives.order_of(candidate) is not None:
             # Between two orders of the grid both are chosen: each is found anew without the other.
             near = [part for one, part in zip(chosen, own_m, strict=True) if _neighbours(doings, one, candidate)]
-            out.append(_mesh(sim, doings, place.joint - 1, candidate, left_m + sum(near), weight))
+            out += _periodic(sim, doings, candidate, left_m + sum(near), weight)
         elif place.effect == "base_shift":
             out.append(_shift(sim, doings, place.record, left_m + own, weight, None))
         elif place.effect == "target_slip":
@@ -219,26 +219,22 @@ def _alike_near(spectra: list[Spectrum], step: float) -> tuple[float, float]:
 
 
 def _neighbours(doings: Doings, one: Candidate, other: Candidate) -> bool:
-    """Whether two mesh errors are one that lies between orders of the grid, or the same."""
+    """Whether two periodic errors are one that lies between orders of the grid, or the same."""
     if not one.place.same_as(other.place):
         return False
-    apart = abs(dict(one.fixed)["order_1"] - dict(other.fixed)["order_1"])
-    return apart < 1.5 * _order_step(doings, other.place.joint - 1)
+    apart = abs(drives.order_of(one) - drives.order_of(other))
+    return apart < 1.5 * drives.order_step(doings, other.place.joint - 1)
 
 
-def _order_step(doings: Doings, joint: int) -> float:
-    return max(drives.FINEST_ORDER_STEP, np.pi / (2.5 * max(doings.seen.span[joint], 1e-6)))
-
-
-def _mesh(sim: Sim, doings: Doings, joint: int, candidate: Candidate, aim_m: Array, weight: Array) -> Candidate:
-    order = dict(candidate.fixed)["order_1"]
-    step = _order_step(doings, joint)
+def _periodic(sim: Sim, doings: Doings, candidate: Candidate, aim_m: Array, weight: Array) -> list[Candidate]:
+    """The order between the neighbours on the grid at which a periodic error explains most, under all its names."""
+    joint, order = candidate.place.joint - 1, drives.order_of(candidate)
     field = sim.fields([Slot(Part.DRIVE, joint)])[:, :, 0]
     x = doings.active[:, joint]
-    orders = order + step * np.linspace(-1.0, 1.0, FINER)
-    orders = orders[orders > 1.5]
+    orders = order + drives.order_step(doings, joint) * np.linspace(-1.0, 1.0, FINER)
+    orders = orders[orders > (0.0 if doings.seen.chain.sliding[joint] else 1.5)]
     gains = [_explained([np.sin(k * x), np.cos(k * x)], field, aim_m, weight) for k in orders]
-    return drives.mesh(doings, joint, float(orders[int(np.argmax(gains))]))
+    return drives.periodic(candidate, doings, float(orders[int(np.argmax(gains))]))
 
 
 def _shift(sim: Sim, doings: Doings, record: int | None, aim_m: Array, weight: Array, target: int | None) -> Candidate:

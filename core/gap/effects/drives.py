@@ -13,7 +13,8 @@ from core.geometry import Array
 
 FINEST_ORDER_STEP, MOST_ORDER = 0.5, 40.0
 HARMONIC_DRIVE_ORDERS = (50.0, 80.0, 100.0, 120.0, 160.0, 200.0, 240.0)
-LEADS_PER_SPAN = np.geomspace(0.4, 30.0, 40)
+MOST_TURNS = 60.0
+"""Of a spindle over the span of a joint that slides."""
 SQUARE_AT_RAD = np.deg2rad([45.0, 60.0, 75.0, 90.0, 105.0, 120.0, 135.0])
 """Angle of the crank to the ground bar in the middle of the joint's span."""
 FLATTEST = 0.12
@@ -47,16 +48,32 @@ def meshes(doings: Doings) -> list[Candidate]:
 
 def mesh_orders(doings: Doings, joint: int) -> list[float]:
     """Orders that are looked at: as fine as the joint's span can tell apart, as high as its stops can show."""
-    step = max(FINEST_ORDER_STEP, np.pi / (2.5 * max(doings.seen.span[joint], 1e-6)))
-    grid = np.arange(2.0, MOST_ORDER + 0.01, step)
+    grid = np.arange(2.0, MOST_ORDER + 0.01, order_step(doings, joint))
     ratio = doings.seen.chain.joints[joint].drive_ratio
     known = HARMONIC_DRIVE_ORDERS if ratio is None else (abs(ratio), 2 * abs(ratio))
     return [float(order) for order in (*grid, *known) if order > 1.5]
 
 
-def mesh(doings: Doings, joint: int, order: float) -> Candidate:
-    """A mesh error of any order (times a turn, or rad a metre where the joint slides)."""
-    return _harmonic("mesh", doings, joint, order, len(mesh_orders(doings, joint)))
+def order_step(doings: Doings, joint: int) -> float:
+    """How far apart orders are looked at, times a turn (rad a metre where the joint slides)."""
+    span = max(float(doings.seen.span[joint]), 1e-6)
+    return 0.8 * np.pi / span if doings.seen.chain.sliding[joint] else max(FINEST_ORDER_STEP, np.pi / (2.5 * span))
+
+
+def order_of(candidate: Candidate) -> float | None:
+    """The order of a periodic error, times a turn (rad a metre where the joint slides); None: nothing was chosen."""
+    fixed = dict(candidate.fixed)
+    return 2 * np.pi / fixed["lead_m"] if "lead_m" in fixed else fixed.get("order_1")
+
+
+def periodic(candidate: Candidate, doings: Doings, order: float) -> list[Candidate]:
+    """The same periodic error with another order.
+
+    What comes once a turn of a spindle and what comes several times cannot be told apart where its lead is not known.
+    """
+    joint = candidate.place.joint - 1
+    effects = ("eccentricity", "mesh") if doings.seen.chain.sliding[joint] else (candidate.place.effect,)
+    return [_harmonic(effect, doings, joint, order, candidate.choices) for effect in effects]
 
 
 def linkages(doings: Doings) -> list[Candidate]:
@@ -114,8 +131,9 @@ def _harmonic(effect: str, doings: Doings, joint: int, order: float, choices: in
 
 
 def _spindle_orders(doings: Doings, joint: int) -> list[float]:
-    span = max(float(doings.seen.span[joint]), 1e-6)
-    return [float(2 * np.pi * turns / span) for turns in LEADS_PER_SPAN]
+    step = order_step(doings, joint)
+    most = 2 * np.pi * MOST_TURNS / max(float(doings.seen.span[joint]), 1e-6)
+    return [float(order) for order in np.arange(step, most + step, step)]
 
 
 def _linkage(joint: int, square_at: float, choices: int) -> Candidate:
