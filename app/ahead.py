@@ -4,33 +4,28 @@ What is kept belongs to the very campaign that it was computed from; any other o
 """
 
 import pickle
-import time
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
 
 from core.calibration import Calibration, calibrate
-from core.errors import TrueaxisError
 from core.measurements import Campaign
-
-LONGEST_S = 0.15
-"""A solution that takes longer is not computed ahead: a shot that is asked for meanwhile would have to wait."""
 
 
 class SolveAhead:
-    """The last campaign that was solved, with its solution."""
+    """The last campaign that was solved or is being solved, with its solution. Any thread may ask."""
 
     def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix="trueaxis-ahead")
+        self._lock = threading.Lock()
         self._key: bytes | None = None
-        self._found: Calibration | None = None
-        self._slow = False
+        self._found: Future[Calibration] | None = None
 
     def prepare(self, campaign: Campaign) -> None:
-        """Solve a campaign if that is quick; one that cannot be solved is left for when it is asked for."""
-        if self._slow or self._key == _key(campaign):
-            return
-        try:
-            self.solution(campaign)
-        except TrueaxisError:
-            # The operator did not ask yet, and is told in a sentence when asking.
-            return
+        """Begin to solve a campaign, unless another one is being solved; errors are said when it is asked for."""
+        key = _key(campaign)
+        with self._lock:
+            if key != self._key and (self._found is None or self._found.done()):
+                self._key, self._found = key, self._pool.submit(calibrate, campaign)
 
     def solution(self, campaign: Campaign) -> Calibration:
         """The solution of a campaign: at once if it was computed from the very same one.
@@ -39,12 +34,14 @@ class SolveAhead:
             TrueaxisError: as for ``calibrate``.
         """
         key = _key(campaign)
-        if self._found is None or key != self._key:
-            start = time.perf_counter()
-            found = calibrate(campaign)
-            self._slow = time.perf_counter() - start > LONGEST_S
-            self._key, self._found = key, found
-        return self._found
+        with self._lock:
+            found = self._found if key == self._key else None
+        if found is None:
+            found = Future()
+            found.set_result(calibrate(campaign))
+            with self._lock:
+                self._key, self._found = key, found
+        return found.result()
 
 
 def _key(campaign: Campaign) -> bytes:

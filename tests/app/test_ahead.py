@@ -1,5 +1,6 @@
 """Solving ahead: nothing is computed twice, and nothing is shown that belongs to other data."""
 
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -60,11 +61,21 @@ def test_what_cannot_be_solved_is_said_when_it_is_asked_for(solved):
         ahead.solution(few)
 
 
-def test_what_takes_long_is_not_computed_ahead(solved, monkeypatch):
-    monkeypatch.setattr(app.ahead, "LONGEST_S", 0.0)
+def test_whoever_asks_meanwhile_waits_for_what_is_being_solved(monkeypatch):
+    begun, go, asked = threading.Event(), threading.Event(), []
+
+    def slow(campaign):
+        asked.append(campaign)
+        begun.set()
+        assert go.wait(10)
+        return calibrate(campaign)
+
+    monkeypatch.setattr(app.ahead, "calibrate", slow)
     ahead = SolveAhead()
     ahead.prepare(simulate_campaign(1))
+    assert begun.wait(10)
+    # One at a time: what comes meanwhile is left for when it is asked for.
     ahead.prepare(simulate_campaign(2))
-    assert len(solved) == 1
-    ahead.solution(simulate_campaign(2))
-    assert len(solved) == 2
+    threading.Timer(0.1, go.set).start()
+    assert ahead.solution(simulate_campaign(1)).rejected is not None
+    assert len(asked) == 1
