@@ -38,5 +38,5 @@ def spot_of(finding: Finding) -> Spot | None:
 
 def spot_named(word: str) -> Spot | None:
     """The spot that a browser names; None: it says anything else."""
-    found = re.fullmatch(rf"([1-9]\d{{0,2}})(?:-({'|'.join(PARAMETERS)}))?", word)
+    found = re.fullmatch(rf"([1-9]\d{{0,2}})(?:-({'|'.join(PARAMETERS)}))?", word, re.ASCII)
     return None if found is None else Spot(int(found[1]), found[2] or "")
