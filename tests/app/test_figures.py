@@ -4,11 +4,13 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from app.figures.axis_uncertainty import axis_uncertainty_figure
 from app.figures.couplings import coupling_figure
 from app.figures.curves import COVERAGE
 from app.figures.deviations import deviations_figure
+from app.figures.over_time import over_time_figure
 from app.figures.residuals import residual_figure
-from app.figures.style import MOST_POINTS, lines_of_legend, plain, thinned
+from app.figures.style import MOST_POINTS, in_theme, lines_of_legend, plain, thinned
 from app.figures.transmissions import transmission_figure
 from core.report import parameters_table, sweep_rows
 from core.sweep_fits import active_from_zero
@@ -168,3 +170,47 @@ def test_legends_have_room():
     for calibration in (six_joints(), families_compared()):
         figure = transmission_figure(calibration, 5)
         assert figure.layout.margin.b >= 18 * lines_of_legend(figure.data, figure.layout.width) + 40
+
+
+@pytest.mark.parametrize("case", NAMED)
+def test_every_point_has_its_residual_at_its_time(case):
+    calibration = NAMED[case]()
+    figure, residuals = over_time_figure(calibration), calibration.refinement.residuals
+    for row, name in enumerate(("axial_m", "radial_m", "tangential_m"), 1):
+        values = np.asarray(getattr(residuals, name))
+        known = np.isfinite(values) & residuals.used
+        kept = [t for t in markers(figure, row) if t.name != "rejected"]
+        drawn = np.concatenate([t.y for t in kept])
+        if known.sum() <= MOST_POINTS:
+            assert np.sort(drawn) == pytest.approx(np.sort(values[known] * 1e3))
+        assert np.isin(drawn, values[known] * 1e3).all()
+        assert {t.name for t in kept} == {f"joint {j}" for j in np.unique(residuals.joint[residuals.used])}
+    time = calibration.campaign.measurements.time_s
+    title = next(a.title.text for a in figure.select_xaxes() if a.title.text)
+    assert title.startswith("record" if time is None else "time since")
+
+
+def test_time_runs_from_the_first_point_in_a_unit_that_suits_it():
+    calibration = six_joints()
+    time = calibration.campaign.measurements.time_s[calibration.refinement.residuals.row]
+    x = np.concatenate([t.x for t in markers(over_time_figure(calibration), 1)])
+    assert np.sort(x) == pytest.approx(np.sort(time - time.min()) / 60.0)
+
+
+def test_uncertainties_of_axes_are_those_of_both_estimates():
+    calibration = six_joints()
+    figure = axis_uncertainty_figure(calibration)
+    for row in (1, 2):
+        for trace, estimate in zip(
+            markers(figure, row), (calibration.joint_by_joint, calibration.estimate), strict=True
+        ):
+            expected = [estimate.axis_std(int(joint))[row - 1] * 1e3 for joint in trace.x]
+            assert trace.y == pytest.approx(expected)
+            assert list(trace.x) == ["1", "2", "3", "4", "5", "6"]
+
+
+def test_a_dark_page_changes_the_look_and_nothing_that_is_drawn():
+    light, dark = (in_theme(residual_figure(six_joints(), 0), theme) for theme in (False, True))
+    assert light.layout.template.layout.font.color != dark.layout.template.layout.font.color
+    assert [t.to_plotly_json()["name"] for t in light.data] == [t.to_plotly_json()["name"] for t in dark.data]
+    assert in_theme(dark, False).layout == light.layout
