@@ -19,6 +19,7 @@ from core.errors import InputError
 from core.geometry import Array
 from core.instruments import PointMeter, RobotDriver
 from core.robot import Joint, JointKind, Robot
+from core.session_events import Event, Fact, Setting
 from core.session_state import State
 from core.theodolite import Theodolite
 from core.twin import irb_l6, scara
@@ -29,6 +30,8 @@ from core.twin.own_robot import own_cell
 
 SETTING = "points_from"
 """Key of the session's setting that names the source."""
+SAID = "source"
+"""The fact, and so the note of an exported campaign, that says that nothing was measured."""
 
 
 class Source(StrEnum):
@@ -95,6 +98,12 @@ def source_of(state: State, cell: Cell | None = None) -> Source:
     if said in tuple(Source):
         return Source(said)
     return Source.BY_HAND if demo_cell(state, cell) is None else Source.DEMO
+
+
+def source_events(source: Source, robot: str) -> list[Event]:
+    """What gives a session a source, and has every report say so where nothing is measured."""
+    simulated = "" if source is Source.BY_HAND else f"simulated: no {robot} was measured"
+    return [Setting(SETTING, str(source)), Fact(SAID, simulated)]
 
 
 def demo_cell(state: State, cell: Cell | None = None) -> Cell | None:

@@ -14,6 +14,7 @@ from core.kinematics import active_commands
 from core.robot import Robot
 from core.session_events import (
     Event,
+    Fact,
     InstrumentChosen,
     Planned,
     PosesPlanned,
@@ -38,7 +39,7 @@ def new_cell_events(chosen: RobotChosen, robot: Robot, title: str, instrument: I
 
 
 def same_cell_events(state: State) -> list[Event]:
-    """What a session on the same robot, targets, instrument and plan as another begins with; no shots.
+    """What a session on the same robot, targets, instrument, plan and facts as another begins with; no shots.
 
     Raises:
         InputError: that session has no robot.
@@ -51,7 +52,7 @@ def same_cell_events(state: State) -> list[Event]:
     events.append(Planned(state.plan.sweeps, state.plan.home, state.plan.joint_values))
     if state.poses.wanted:
         events.append(PosesPlanned(state.poses.wanted, state.poses.targets))
-    return events
+    return events + [Fact(key, value) for key, value in state.facts.items()]
 
 
 def changed_targets(state: State, targets: tuple[TargetEntry, ...]) -> list[Event]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.cell_words import targets_words
-from app.rigs import SETTING, Source, source_of
+from app.rigs import Source, source_events, source_of
 from app.words import block
 from app.workbench import Workbench
 from core.campaign_files import INSTRUMENT_KINDS
@@ -21,7 +21,7 @@ from core.cell_setup import (
 )
 from core.errors import InputError
 from core.point_lines import entered_points
-from core.session_events import Event, InstrumentChosen, Setting, TargetEntry
+from core.session_events import Event, InstrumentChosen, TargetEntry
 from core.session_plan import PlannedSweep
 from core.suggested_plan import suggested_sweeps
 from core.wording import display_unit
@@ -106,7 +106,7 @@ class InstrumentEntry:
             state = self._bench.state
             events: list[Event] = []
             if source is not None and source is not source_of(state):
-                events.append(_source_event(self._bench, source))
+                events += _source_events(self._bench, source)
             sigma = _sigma_m(text)
             if (kind, sigma) != (state.instrument.kind, state.instrument.sigma_m):
                 if source is Source.DEMO:
@@ -238,13 +238,13 @@ def _append(bench: Workbench, events: list[Event]) -> None:
         bench.changed()
 
 
-def _source_event(bench: Workbench, source: Source) -> Setting:
-    """The setting that says where points come from; measured and simulated ones never stand in one session."""
+def _source_events(bench: Workbench, source: Source) -> list[Event]:
+    """What says where points come from; measured and simulated ones never stand in one session."""
     if bench.state.shots or bench.state.checks:
         raise InputError("there are shots already; begin a new session for points from elsewhere")
     if source is Source.DEMO and bench.rig.source is not Source.DEMO:
         raise InputError("this is not the demo cell; begin a new session with it")
-    return Setting(SETTING, str(source))
+    return source_events(source, bench.nominal.name)
 
 
 def _name(row: PlannedSweep) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 import viser
 
 from app.cell_words import tray_words
-from app.rigs import SETTING, Source, rig_for
+from app.rigs import SETTING, Source, rig_for, source_events
 from app.uploads import as_file
 from app.workbench import Workbench
 from core.cell_setup import new_cell_events, same_cell_events
@@ -112,7 +112,7 @@ class NewSession:
         chosen, robot = self._tray.robot_event(base, tip), self._tray.robot(base, tip)
         instrument = SIMULATED_INSTRUMENT if simulated else InstrumentChosen("other")
         events = new_cell_events(chosen, robot, title or robot.name, instrument)
-        return [*events, Setting(SETTING, str(Source.SIMULATED if simulated else Source.BY_HAND))]
+        return [*events, *source_events(Source.SIMULATED if simulated else Source.BY_HAND, robot.name)]
 
     def _open_campaign(self, event: object) -> None:
         def job(client: object) -> None:

@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.rigs import SETTING, Source, key_of, no_robot, rig_for
+from app.rigs import SETTING, Source, key_of, no_robot, rig_for, source_events
 from app.workbench import Workbench
 from core.instruments import InstrumentFailed, MeasureRequest, Reading
 from core.session import Session
+from core.session_campaign import to_campaign
 from core.session_events import InstrumentChosen, Planned, RobotChosen, Setting, TargetsNamed, Titled
 from core.session_state import State
 from core.suggested_plan import suggested_sweeps, suggested_targets
@@ -123,3 +124,14 @@ def test_a_session_without_a_readable_robot_can_still_be_looked_at():
         assert key_of(state).source is Source.BY_HAND
         with pytest.raises(InstrumentFailed):
             rig.meter.measure(MeasureRequest("T1", (0.0,)), lambda: False)
+
+
+def test_what_is_simulated_says_so_in_every_report(tmp_path):
+    with own_session(tmp_path / "a.trueaxis", None) as session:
+        session.append_all(source_events(Source.SIMULATED, "three"))
+        bench = Workbench(session)
+        bench.run(False)
+        assert to_campaign(bench.state).notes["source"] == "simulated: no three was measured"
+    with own_session(tmp_path / "b.trueaxis", Source.SIMULATED) as session:
+        session.append_all(source_events(Source.BY_HAND, "three"))
+        assert "source" not in session.state.facts

@@ -20,7 +20,7 @@ from core.cell_setup import (
 from core.errors import InputError
 from core.kinematics import active_commands
 from core.session import Session
-from core.session_events import InstrumentChosen, RobotChosen, TargetEntry
+from core.session_events import Fact, InstrumentChosen, RobotChosen, TargetEntry
 from core.session_poses import new_poses
 from core.session_state import State
 from core.twin import irb_l6, scara
@@ -46,10 +46,12 @@ def test_a_new_session_on_a_robot_can_be_measured_at_once(cell, tmp_path: Path) 
     with Session.create(tmp_path / "a.trueaxis", events) as session:
         assert session.state.next_step.joint == cell.robot.joint_count
         assert session.state.title == "mine"
+        session.append(Fact("Robot serial number", "L6-17"))
         again = same_cell_events(session.state)
         with Session.create(tmp_path / "b.trueaxis", again) as other:
             assert other.state.steps == session.state.steps
             assert other.state.shots == ()
+            assert other.state.facts["Robot serial number"] == "L6-17"
 
 
 def test_without_a_robot_there_is_no_other_session_like_it() -> None:
