@@ -6,9 +6,9 @@ A point on link k, seen by the instrument, is
 
 with the joints' motions M_i and the constant link transforms of the nominal chain in between, and small motions that
 an effect can make differ from point to point: d_i of a joint's displacement, N_i of an axis in the link before it,
-L_i of the link behind it, u of a target on its link, B of the base, s of the instrument's unit of length. Every effect
-is a rule that says how these small motions depend on what the arm does. Composed without approximation they are the
-exact model; their first derivatives are the columns that the search looks through.
+L_i of the link behind it or of what that carries, u of a target on its link, B of the base, s of the instrument's unit
+of length. Every effect is a rule that says how these small motions depend on what the arm does. Composed without
+approximation they are the exact model; their first derivatives are the columns that the search looks through.
 """
 
 from dataclasses import dataclass, replace
@@ -32,6 +32,8 @@ class Part(Enum):
     """Axis ``index`` in the link before it: turn (0..2) and shift (3..5) in the frame before the joint moved."""
     LINK = "link"
     """Link ``index``: turn and shift in the frame that moves with joint ``index``."""
+    BEYOND = "beyond"
+    """What link ``index`` carries, as LINK: targets on the link itself stay, but on the farthest link they move."""
     TARGET = "target"
     """Target ``index`` on its link, shift (0..2)."""
     BASE = "base"
@@ -132,7 +134,8 @@ class Sim:
                 local[:, slot.axis] += np.where(self.seen.target == slot.index, value, 0.0)
         for i in range(chain.joint_count - 1, -1, -1):
             rides = self.seen.link > i
-            moved = _move(_twist(motions, Part.LINK, i, m), local)
+            moved = np.where(self._beyond(i)[:, None], _move(_twist(motions, Part.BEYOND, i, m), local), local)
+            moved = _move(_twist(motions, Part.LINK, i, m), moved)
             moved = _joint_motion(net[:, i], bool(chain.sliding[i]), moved)
             moved = _move(_twist(motions, Part.AXIS, i, m), moved)
             before = chain.link_transforms[i - 1] if i else chain.base_transform
@@ -173,7 +176,13 @@ class Sim:
         frame = (before if slot.part is Part.AXIS else after)[:, slot.index]
         unit = frame[:, :3, slot.axis % 3]
         answer = cross(unit, points - frame[:, :3, 3]) if slot.axis < 3 else unit
-        return np.where((self.seen.link > slot.index)[:, None], answer, 0.0)
+        rides = self._beyond(slot.index) if slot.part is Part.BEYOND else self.seen.link > slot.index
+        return np.where(rides[:, None], answer, 0.0)
+
+    def _beyond(self, index: int) -> np.ndarray:
+        """Points that a link carries: on links behind it, or on itself where none of them has a target, (m,)."""
+        farthest = max(target.link for target in self.seen.campaign.targets)
+        return self.seen.link > (index if index + 1 == farthest else index + 1)
 
 
 def _joint_motion(displacement: Array, sliding: bool, points: Array) -> Array:

@@ -18,7 +18,7 @@ STEP = 1e-5
 def all_slots(sim: Sim) -> list[Slot]:
     n, targets = sim.seen.joint_count, len(sim.target_m)
     slots = [Slot(part, j) for part in (Part.JOINT, Part.DRIVE) for j in range(n)]
-    slots += [Slot(part, j, k) for part in (Part.AXIS, Part.LINK) for j in range(n) for k in range(6)]
+    slots += [Slot(part, j, k) for part in (Part.AXIS, Part.LINK, Part.BEYOND) for j in range(n) for k in range(6)]
     slots += [Slot(Part.TARGET, t, k) for t in range(targets) for k in range(3)]
     return [*slots, *(Slot(Part.BASE, 0, k) for k in range(6)), Slot(Part.SCALE)]
 
@@ -53,6 +53,8 @@ def by_hand(sim: Sim, motions: dict[Slot, Array], k: int) -> Array:
         else:
             move[:3, :3] = Rotation.from_rotvec([0, 0, net[i]]).as_matrix()
         frame = frame @ before @ rigid(motions, Part.AXIS, i, k) @ move @ rigid(motions, Part.LINK, i, k)
+        if seen.link[k] > i + 1 or i + 1 == robot.joint_count:
+            frame = frame @ rigid(motions, Part.BEYOND, i, k)
         before = robot.link_transforms[i]
     t = seen.target[k]
     place = sim.target_m[t] + [motions[Slot(Part.TARGET, t, axis)][k] for axis in range(3)]
@@ -96,6 +98,15 @@ def test_what_moves_a_link_leaves_the_links_below_alone() -> None:
         assert below.any()
         assert moved[below].max() == 0
         assert moved[~below].min() > 0
+
+
+def test_what_a_link_carries_does_not_move_its_own_targets() -> None:
+    """But on the last link, which carries nothing else."""
+    sim = random_sim(ARMS["coupled"](5), 5)
+    for index, still in ((1, sim.seen.link <= 2), (3, sim.seen.link <= 3)):
+        moved = np.abs(sim.fields([Slot(Part.BEYOND, index, 4)])).max(axis=(1, 2))
+        assert moved[still].max() == 0
+        assert moved[~still].min() > 0
 
 
 def test_a_motor_moves_the_joint_that_it_is_coupled_to() -> None:

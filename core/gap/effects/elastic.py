@@ -149,8 +149,8 @@ def _flexure(link: int, largest: float, rough: bool) -> Candidate:
 def _bend(link: int, axis: int, angle: Array, middle: Array) -> Column:
     """A link turns by an angle about an axis through its middle."""
     away = np.cross(middle, np.eye(3)[axis])
-    column = [(Slot(Part.LINK, link, axis), angle)]
-    return column + [(Slot(Part.LINK, link, 3 + c), angle * away[c]) for c in range(3) if abs(away[c]) > 1e-12]
+    column = [(Slot(Part.BEYOND, link, axis), angle)]
+    return column + [(Slot(Part.BEYOND, link, 3 + c), angle * away[c]) for c in range(3) if abs(away[c]) > 1e-12]
 
 
 def _payload(doings: Doings, heaviest: dict[int, float], logged: bool, centre: bool) -> Candidate:

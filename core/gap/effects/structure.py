@@ -28,7 +28,7 @@ def geometries(doings: Doings) -> list[Candidate]:
 def geometry_slots(doings: Doings) -> list[Slot]:
     """All small changes of geometry, zero offsets of turning joints among them."""
     last = min(doings.seen.joint_count, int(doings.seen.link.max()))
-    slots = [Slot(Part.LINK, i, k) for i in range(last - 1) for k in LINK_AXES]
+    slots = [Slot(Part.BEYOND, i, k) for i in range(last - 1) for k in LINK_AXES]
     return slots + [Slot(Part.JOINT, j) for j in range(last) if not doings.seen.chain.sliding[j]]
 
 
@@ -52,7 +52,7 @@ def thermals(doings: Doings) -> list[Candidate]:
 
 def _geometry(link: int) -> Candidate:
     def columns(doings: Doings) -> list[Column]:
-        return [[(Slot(Part.LINK, link, k), np.ones(doings.count))] for k in LINK_AXES]
+        return [[(Slot(Part.BEYOND, link, k), np.ones(doings.count))] for k in LINK_AXES]
 
     reference = (ANGLE, ANGLE, LENGTH, LENGTH, LENGTH)
     return Candidate(Place("geometry", frame=link + 1), "", LINK_NAMES, columns, 1, reference)
@@ -109,7 +109,7 @@ def _thermal(links: list[int], everywhere: bool, law_name: str, law: Law, laws: 
     def columns(doings: Doings) -> list[Column]:
         rise = law(doings)
         steps = doings.seen.chain.link_transforms[:, :3, 3]
-        one = [[(Slot(Part.LINK, i, 3 + c), rise * steps[i, c]) for c in range(3) if steps[i, c]] for i in links]
+        one = [[(Slot(Part.BEYOND, i, 3 + c), rise * steps[i, c]) for c in range(3) if steps[i, c]] for i in links]
         together = [term for column in one for term in column]
         return [together, *one] if everywhere and len(links) > 1 else one
 
