@@ -14,10 +14,13 @@ from core.gap.sim import Part, Sim, Slot, _move
 from core.geometry import Array, apply, rigid_fit, transform
 from core.kinematics import link_frames
 
-STARTS, REFINED, ROUNDS = 120, 6, 12
+STARTS, REFINED, ROUNDS = 120, 6, 25
 SEARCHED_POINTS = 400
 WEAK = 1e-9
 """Of the largest curvature: what the points say nothing of stays where it is."""
+LOOSE, DAMPED = 1e-4, (1e-6, 1.0)
+"""The same while the base's direction is a guess, which must not send targets away along nearly parallel axes; first
+and largest damping of the steps from there."""
 
 
 def place(seen: Observations, weights: Array) -> Sim:
@@ -86,7 +89,8 @@ def _linear_rest(seen: Observations, weights: Array, turn: Array) -> tuple[float
     root = np.sqrt(weights)[:, None]
     flat = (columns * root[:, :, None]).reshape(-1, columns.shape[2])
     square = flat.T @ flat
-    square[np.diag_indices_from(square)] += WEAK * max(np.trace(square), 1e-300)
+    ridge = np.where(np.arange(len(square)) < 3, WEAK, LOOSE)
+    square[np.diag_indices_from(square)] += ridge * max(np.trace(square), 1e-300)
     found = np.linalg.solve(square, flat.T @ (rest * root).ravel())
     for k, t in enumerate(unknown):
         places[t] = found[3 + 3 * k : 6 + 3 * k]
@@ -99,26 +103,29 @@ def _misfit(sim: Sim, weights: Array) -> float:
 
 
 def _refined(sim: Sim, weights: Array) -> Sim:
-    """Gauss-Newton steps on base and targets together."""
+    """Steps of Levenberg and Marquardt on base and targets together."""
     slots = placement_slots(sim.seen)
     priors = placement_priors(sim.seen, slots)
     stated = _known_places(sim.seen)
     precision = np.where(np.isfinite(priors), 1.0 / np.maximum(priors, 1e-9) ** 2, 0.0)
-    misfit = _misfit(sim, weights)
+    misfit, damping = _misfit(sim, weights), DAMPED[0]
     for _ in range(ROUNDS):
         fields = sim.fields(slots)
         square = np.einsum("mck,m,mcl->kl", fields, weights, fields, optimize=True)
         pull = np.einsum("mck,m,mc->k", fields, weights, sim.seen.point_m - sim.points_m(), optimize=True)
         pull -= precision * _away(sim, stated, slots)
-        square += np.diag(precision + WEAK * np.trace(square) / len(square))
+        square += np.diag(precision + damping * np.trace(square) / len(square))
         moved = with_placement(sim, slots, np.linalg.solve(square, pull))
         now = _misfit(moved, weights)
-        if not now < misfit:
+        if now < misfit:
+            settled = misfit - now < 1e-10 * misfit
+            sim, misfit, damping = moved, now, max(damping / 30, WEAK)
+            if settled:
+                break
+        elif damping > DAMPED[1]:
             break
-        settled = misfit - now < 1e-10 * misfit
-        sim, misfit = moved, now
-        if settled:
-            break
+        else:
+            damping *= 30
     return sim
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_arms import ARMS, campaign, measured_at, random_sim, table, with_points
+from gap_arms import ARMS, campaign, kinds, measured_at, random_sim, table, with_points
 from hypothesis import given, settings
 from random_arms import SEEDS, random_motion
 
@@ -13,6 +13,7 @@ from core.gap.placement import place, placement_priors, placement_slots
 from core.gap.sim import Part, Sim
 from core.geometry import Array, apply, invert, rigid_fit
 from core.measurements import Target
+from core.robot_builders import DhRow, robot_from_dh
 
 
 def posed(name: str, seed: int, count: int = 40) -> Sim:
@@ -31,6 +32,22 @@ def known(seen: Observations, places: Array, sigma_m: float = 0.0) -> Observatio
 
 def misfit(sim: Sim, seen: Observations) -> float:
     return float(np.abs(sim.points_m() - seen.point_m).max())
+
+
+def test_axes_that_are_nearly_parallel_send_no_target_away() -> None:
+    """All axes upright to a milliradian: how high base and targets sit together is nearly open, no more than that."""
+    tilts = np.random.default_rng(1).normal(scale=1e-3, size=(4, 2))
+    rows = [
+        DhRow(0.1, d, a + tilt[0], tilt[1])
+        for d, a, tilt in zip((0.4, 0, 0, 0.1), (0.35, 0.3, 0, 0), tilts, strict=True)
+    ]
+    robot = robot_from_dh("scara", kinds((False, False, True, False)), rows)
+    for seed in range(4):
+        sim = random_sim(robot, seed, 80)
+        seen = with_points(sim.seen, sim.points_m() + 2e-5 * np.random.default_rng(seed).normal(size=(80, 3)))
+        found = place(seen, np.ones(80))
+        assert misfit(found, seen) < 2e-4
+        assert np.abs(found.target_m).max() < 1.0
 
 
 @pytest.mark.parametrize("name", ["phi", "dh with slides", "coupled"])
