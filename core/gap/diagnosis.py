@@ -54,6 +54,8 @@ CLOSED = 0.9
 """Share of the gap beyond the floor that causes must close to explain it."""
 NEARLY = 2.0
 """Floors that may be left at most where causes explain a gap."""
+BEYOND_NOISE = 2.0
+"""Times what noise lets expect: where kept-out points are farther off, there is a gap, whatever the search says."""
 NOISE_LIKE = 0.01
 """Probability below which what is left is not noise."""
 
@@ -238,6 +240,12 @@ class Findings:
         return self.honest.square_m2(self.wide.chosen(self.chosen))
 
     @cached_property
+    def expected_m2(self) -> float:
+        """What noise lets expect to be left on kept-out points, fits as uncertain as they are."""
+        noise_m2 = np.trace(self.wide.noise.covariance_m2, axis1=1, axis2=2)
+        return self.honest.expected_m2(self.wide.chosen(self.chosen), noise_m2)
+
+    @cached_property
     def left_m(self) -> Array:
         """Residuals after all named causes, fitted on all points, (m, 3)."""
         index, numbers, _ = self.honest.fitted(self.wide.chosen(self.chosen))
@@ -278,7 +286,7 @@ class Findings:
 
     @cached_property
     def verdict(self) -> Verdict:
-        if not self.stands and self.analysis.noise.excess == 1:
+        if not self.stands and self.analysis.noise.excess == 1 and self.left_m2 < BEYOND_NOISE**2 * self.expected_m2:
             return Verdict.NO_GAP
         if not self.named:
             return Verdict.UNEXPLAINED

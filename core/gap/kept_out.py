@@ -114,6 +114,22 @@ class KeptOut:
         )
         return float(max(sum_m2, 0.0) / max(np.count_nonzero(self.judged), 1))
 
+    def expected_m2(self, chosen: Chosen, noise_m2: Array) -> float:
+        """Mean square of those residuals that noise and estimates as uncertain as they are let expect, m^2.
+
+        Args:
+            noise_m2: mean square length of the noise of each point, (m,).
+        """
+        index, prior = self.index(chosen)
+        squares, _ = self._sums
+        plain, _, _ = self._plain_sums
+        whole, total = squares[:CHECK].sum(axis=0), float(noise_m2[self.judged].sum())
+        for f in np.unique(self.fold):
+            square = whole - squares[f] if f != CHECK else whole
+            covariance = np.linalg.inv(square[np.ix_(index, index)] + np.diag(prior))
+            total += float(np.sum(covariance * plain[f][np.ix_(index, index)]))
+        return total / max(np.count_nonzero(self.judged), 1)
+
     def _by_fold(self, chosen: Chosen) -> Iterator[tuple[int, Array]]:
         """Each fold with the estimates from all others."""
         index, prior = self.index(chosen)
