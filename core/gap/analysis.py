@@ -37,6 +37,8 @@ MOST_FLEXIBLE, MOST_SPENT = 4, 0.08
 PASSES = 3
 BENT = 0.15
 """Curvature below this share of the noise does not matter."""
+LEAST_FREEDOM = 12
+"""Residuals that a fit leaves free; fewer say nothing of the noise."""
 CHANCE, LEAST_EXCESS = 3.5, 0.2
 """Standard deviations, and logarithm of a ratio of variances, beyond which repeats scatter less than residuals."""
 
@@ -358,7 +360,9 @@ def _learned_noise(told: Doings, problem: Problem, spent: float, left: Array, fi
     covariance = first.covariance_m2
     standard = whitening(covariance, np.ones(len(left))).rows(left)
     used = first.weight > 0
-    freedom = max(3 * np.count_nonzero(used) - spent, 3)
+    freedom = 3 * np.count_nonzero(used) - spent
+    if freedom < LEAST_FREEDOM:
+        return first
     variance = noise_found.robust_variance(standard[used]) * 3 * np.count_nonzero(used) / freedom
     scaled = standard / np.sqrt(max(variance, 1e-300))
     memory = noise_found.memory(told, scaled, used)

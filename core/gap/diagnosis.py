@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from core.calibrated_arm import CalibratedArm
+from core.errors import CampaignError
 from core.gap.advice import advice
 from core.gap.analysis import Analysis, Progress, analyse
 from core.gap.corrected import CorrectedSim, Diagnosis
@@ -80,10 +81,11 @@ def diagnose(
         progress: called with a share of the work and what is being done.
 
     Raises:
-        CampaignError: there is nothing to compare.
+        CampaignError: there is nothing to compare, or too little.
     """
     start = time.perf_counter()
     seen = observe(campaign, arm)
+    _require_enough(seen)
     only = None if told is None else _only(told)
     some = thinned(seen)
     analysis = analyse(some, frozenset(without), only, progress or quiet)
@@ -96,6 +98,16 @@ def diagnose(
         seconds=time.perf_counter() - start,
         peak_memory_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     )
+
+
+def _require_enough(seen: Observations) -> None:
+    """Whether anything is left to compare once base and targets are placed."""
+    unknowns, points = len(placement_slots(seen)), int(np.count_nonzero(~seen.check)) or seen.count
+    if 3 * points <= unknowns:
+        raise CampaignError(
+            f"{points} measured {'point' if points == 1 else 'points'} cannot be compared with a sim: where the base "
+            f"and the targets stand takes {unknowns} numbers, so at least {unknowns // 3 + 1} points are needed"
+        )
 
 
 def _only(told: Sequence[dict[str, object]]) -> Callable[[Candidate], bool]:
@@ -264,9 +276,12 @@ class Findings:
         out = np.empty_like(residual_m)
         for f in np.unique(self.all_folds):
             fit = (self.all_folds != f) & (noise.weight > 0)
+            mine = self.all_folds == f
+            if not fit.any():
+                out[mine] = residual_m[mine]
+                continue
             whole = square[fit].sum(axis=0)
             whole += 1e-9 * np.trace(whole) / len(whole) * np.eye(len(whole))
-            mine = self.all_folds == f
             out[mine] = residual_m[mine] - fields[mine] @ np.linalg.solve(whole, pull[fit].sum(axis=0))
         return out
 
@@ -326,7 +341,7 @@ def _report(campaign: Campaign, arm: CalibratedArm | None, found: Findings) -> D
         outliers=tuple(
             Outlier(int(found.seen.record[k]), float(np.linalg.norm(found.left_m[k]))) for k in noise.outliers
         ),
-        warnings=warnings_of(a.doings, noise),
+        warnings=warnings_of(a.doings, noise, a.sim),
         evidence_map=_evidence_map(found) if gap else (),
         reliability=reliability(a.problem, a.evidence, a.threshold) if gap else None,
         hold_out=HOLD_OUT,

@@ -4,12 +4,16 @@ import numpy as np
 
 from core.gap.analysis import NoiseFound
 from core.gap.doings import Doings
+from core.gap.effects.candidate import motors
 from core.gap.observations import placeless
+from core.gap.sim import Part, Sim, Slot
 
 FEW = 60
+ON_AXIS_M = 2e-3
+"""Targets so near to an axis hardly move when its joint turns."""
 
 
-def warnings_of(doings: Doings, noise: NoiseFound) -> tuple[str, ...]:
+def warnings_of(doings: Doings, noise: NoiseFound, sim: Sim) -> tuple[str, ...]:
     """One sentence a question that these data leave open."""
     seen, table = doings.seen, doings.seen.campaign.measurements
     out = []
@@ -40,6 +44,9 @@ def warnings_of(doings: Doings, noise: NoiseFound) -> tuple[str, ...]:
     still = [str(j + 1) for j in np.flatnonzero((seen.span < 1e-6) & seen.chain.commanded)]
     if still:
         out.append(f"Joints that never moved: {', '.join(still)}: nothing can be said of their drives.")
+    hidden = ", ".join(str(j + 1) for j in motors(doings) if _on_axis(sim, j))
+    if hidden:
+        out.append(f"All targets lie on the axis of joint {hidden}: what its drive does cannot be seen.")
     if not seen.posed.any():
         out.append("There are no poses: joints moved one at a time, so effects that need two cannot be tested.")
     if len(np.unique(seen.target)) == 1:
@@ -49,3 +56,10 @@ def warnings_of(doings: Doings, noise: NoiseFound) -> tuple[str, ...]:
             f"Neighbouring points have errors that are alike (correlation {noise.memory:.2f}); this is allowed for."
         )
     return tuple(out)
+
+
+def _on_axis(sim: Sim, joint: int) -> bool:
+    """Whether every target that a turning joint moves lies on its axis; joints count from 0."""
+    lever_m = np.linalg.norm(sim.fields([Slot(Part.JOINT, joint)])[:, :, 0], axis=1)
+    beyond = sim.seen.link > joint
+    return not sim.seen.chain.sliding[joint] and bool(beyond.any()) and float(lever_m[beyond].max()) < ON_AXIS_M
