@@ -301,14 +301,15 @@ class Findings:
 
     @cached_property
     def verdict(self) -> Verdict:
-        if not self.stands and self.analysis.noise.excess == 1 and self.left_m2 < BEYOND_NOISE**2 * self.expected_m2:
+        within = self.left_m2 < BEYOND_NOISE**2 * self.expected_m2
+        if not self.stands and self.analysis.noise.excess == 1 and within:
             return Verdict.NO_GAP
         if not self.named:
             return Verdict.UNEXPLAINED
         base = max(self.gap_m2 - self.floor_m2, 1e-3 * self.floor_m2)
         unknown = any(one.unknown for one in self.stands)
         nearly = (self.gap_m2 - self.left_m2) / base >= CLOSED and self.left_m2 <= NEARLY**2 * self.floor_m2
-        closed = nearly or self.left_test.left_is_noise
+        closed = nearly or (self.left_test.left_is_noise and within)
         return Verdict.EXPLAINED if closed and not unknown else Verdict.PARTLY_EXPLAINED
 
 
