@@ -291,7 +291,7 @@ def _learn(
     if only is not None:
         better = [one for one in better if only(one)]
     state = joined(given, Chosen(found.chosen.groups[:1], found.chosen.sizes[:1]))
-    return Learnt(noise, better, *_about_fit(problem, evidence, prior, state))
+    return Learnt(noise, better, *_about_fit(problem, evidence, prior, state, given))
 
 
 def _flexible(problem: Problem, evidence: Evidence, chosen: Chosen, threshold: float) -> Chosen:
@@ -335,13 +335,16 @@ def _left(problem: Problem, evidence: Evidence, prior: float, chosen: Chosen) ->
     return problem.residual_m - plain @ estimate, own
 
 
-def _about_fit(problem: Problem, evidence: Evidence, prior: float, chosen: Chosen) -> tuple[Sim, Array, float]:
+def _about_fit(
+    problem: Problem, evidence: Evidence, prior: float, chosen: Chosen, given: Chosen
+) -> tuple[Sim, Array, float]:
     """The sim placed anew, and residuals as if the model were linear about the fitted state: exact there.
 
     The strongest candidate alone sets the state: weaker ones may be there only because the model was bent.
     """
     sim = problem.sim
-    if sim.seen.simulated_m is not None:
+    if sim.seen.simulated_m is not None or given.groups:
+        # Where all geometry is free it trades with the base: the fitted state may lie far from where the points are.
         return sim, problem.residual_m, 0.0
     index, estimate = numbers(problem, evidence, prior, chosen)
     slots = placement_slots(sim.seen)
