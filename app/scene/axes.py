@@ -105,7 +105,7 @@ class AxesView(SceneGroup):
         self._nodes = [self._node(mark) for mark in marks]
         self._shafts = [self._arrow(mark, colour, radius_m) for mark in marks]
         self._labels = [self._label(mark) for mark in marks if mark.text]
-        self._tubes: list[viser.MeshHandle] = []
+        self._tubes: dict[int, viser.MeshHandle] = {}
         self._draw_tubes()
 
     def place(self, marks: tuple[AxisMark, ...], exaggeration: float) -> None:
@@ -176,14 +176,15 @@ class AxesView(SceneGroup):
 
     def _draw_tubes(self) -> None:
         solids = [(mark, uncertainty_tube(mark, self._length, self._exaggeration)) for mark in self._marks]
-        if sum(solid is not None for _, solid in solids) < len(self._tubes):
-            for tube in self._tubes:
-                tube.remove()
-        self._tubes = [
-            self._mesh(mark, "tube", solid.about(mark.middle_m), self._colour, TUBE_OPACITY)
-            for mark, solid in solids
-            if solid is not None
-        ]
+        known = [(mark, solid.about(mark.middle_m)) for mark, solid in solids if solid is not None]
+        for joint in self._tubes.keys() - {mark.joint for mark, _ in known}:
+            self._tubes.pop(joint).remove()
+        for mark, solid in known:
+            tube = self._tubes.get(mark.joint)
+            if tube is not None and np.array_equal(tube.faces, solid.faces):
+                tube.vertices = solid.vertices_m.astype(np.float32)
+            else:
+                self._tubes[mark.joint] = self._mesh(mark, "tube", solid, self._colour, TUBE_OPACITY)
 
     def _mesh(self, mark: AxisMark, part: str, solid: Solid, colour: Rgb, opacity: float | None) -> "viser.MeshHandle":
         name = f"{self._root}/{mark.joint}/{part}"
