@@ -21,37 +21,38 @@ from core.twin.noise import Noise, Repeatability
 from core.twin.protocol import Protocol, SweepPlan
 
 SIGMA_M = 2e-5
+ARC, POSES, AGAIN = 13, 28, 12
+"""Points of an arc one way, poses, and how many of them are visited three times."""
 BASE = transform(rotation_about(np.array([0.0, 0.0, 1.0]), 0.7), [2.0, 1.0, -0.5])
-TARGETS = (
-    ("A", 4, (0.16, 0.84, 0.76)),
-    ("B", 4, (-0.14, 0.88, 0.62)),
-    ("C", 2, (0.12, 0.14, 0.62)),
+TARGETS = (("A", 0, (0.16, 0.84, 0.76)), ("B", 0, (-0.14, 0.88, 0.62)), ("C", -1, (0.12, 0.14, 0.62)))
+"""Name, link counted from the last one (C: on the second), and place in the drawing of the arm at rest, frame 1, m."""
+REACH = np.array([1.2, 0.7, 0.75, 1.1])
+LINKS = (
+    LinkMass(42.0, (0.02, -0.05, -0.30)),
+    LinkMass(18.0, (-0.31, -0.02, 0.0)),
+    LinkMass(14.0, (-0.24, 0.0, 0.0)),
+    LinkMass(8.0, (0.0, -0.02, 0.05)),
 )
-"""Name, link, and place in the drawing of the arm at rest, frame 1, metres."""
 
 
-def crane_model() -> PhiModel:
-    """An upright axis, then three level ones: shoulder, elbow, wrist."""
-    turning = np.zeros(4, dtype=bool)
+def crane_model(joints: int) -> PhiModel:
+    """An upright axis, then level ones: shoulder, elbow, wrist."""
     phi, theta = np.array([np.pi / 2, 0.0, 0.0]), np.deg2rad([-90.0, -180.0, -180.0])
-    return PhiModel(phi, np.array([0.0, -0.69, -0.67]), np.zeros(3), np.full(3, np.pi / 2), theta, turning)
+    a, alpha = np.array([0.0, -0.69, -0.67]), np.full(3, np.pi / 2)
+    n = joints - 1
+    return PhiModel(phi[:n], a[:n], np.zeros(n), alpha[:n], theta[:n], np.zeros(joints, dtype=bool))
 
 
-def crane(coupled: bool = True) -> Robot:
-    """A palletiser of four turning joints; motors 2 and 3 pass their motion on, as in a parallelogram."""
+def crane(joints: int) -> Robot:
+    """An arm of three or four turning joints; of four, motors 2 and 3 pass their motion on, as in a parallelogram."""
     limits = ((-2.9, 2.9), (-0.9, 0.9), (-1.0, 1.0), (-1.6, 1.6))
     return robot_from_phi(
         "crane",
-        tuple(Joint(JointKind.REVOLUTE, low_high) for low_high in limits),
-        crane_model(),
+        tuple(Joint(JointKind.REVOLUTE, low_high) for low_high in limits[:joints]),
+        crane_model(joints),
         tool=PhiTool(phi_rad=np.pi / 2, alpha_rad=-np.pi / 2, gamma_rad=np.pi, h_m=0.12),
-        couplings=(Coupling(2, 3, -1.0), Coupling(3, 4, -1.0)) if coupled else (),
-        links=(
-            LinkMass(42.0, (0.02, -0.05, -0.30)),
-            LinkMass(18.0, (-0.31, -0.02, 0.0)),
-            LinkMass(14.0, (-0.24, 0.0, 0.0)),
-            LinkMass(8.0, (0.0, -0.02, 0.05)),
-        ),
+        couplings=(Coupling(2, 3, -1.0), Coupling(3, 4, -1.0)) if joints == 4 else (),
+        links=LINKS[:joints],
         gravity_direction=(0.0, 0.0, -1.0),
     )
 
@@ -79,24 +80,24 @@ def spread(count: int, reach: Array) -> Array:
 
 
 @cache
-def crane_cell(coupled: bool = True, visits: int = 3) -> Cell:
-    """Arcs of every joint both ways, the second time with the others elsewhere; poses, some of them visited again."""
-    robot = crane(coupled)
-    truth = as_drawn(robot, crane_model(), TARGETS)
-    reach = np.array([1.2, 0.7, 0.75, 1.1])
-    arcs = tuple(SweepPlan(joint, -reach[joint - 1], reach[joint - 1], 17, ("A", "B")) for joint in (1, 2, 3, 4))
-    poses = spread(40, reach)
-    again = [poses[:15]] * (visits - 1)
+def crane_cell(joints: int = 3) -> Cell:
+    """Arcs of every joint both ways; poses, some of them visited again."""
+    robot, model, reach = crane(joints), crane_model(joints), REACH[:joints]
+    places = tuple((name, 2 if link else joints, place) for name, link, place in TARGETS)
+    arcs = tuple(
+        SweepPlan(joint, -reach[joint - 1], reach[joint - 1], ARC, ("A", "B")) for joint in range(1, joints + 1)
+    )
+    poses = spread(POSES, reach)
     return Cell(
         title="Simulated crane as drawn",
         robot=robot,
-        nominal=crane_model(),
-        truth=truth,
-        targets=tuple(Target(name, link) for name, link, _ in TARGETS),
-        protocol=Protocol(arcs, np.vstack([poses, *again]), ("A", "C"), seconds_a_shot=20.0, both_ways=True),
+        nominal=model,
+        truth=as_drawn(robot, model, places),
+        targets=tuple(Target(name, link) for name, link, _ in places),
+        protocol=Protocol(arcs, np.vstack([poses, poses[:AGAIN], poses[:AGAIN]]), ("A", "C"), 20.0, both_ways=True),
         instrument=Tracker(SIGMA_M),
         repeatability=Repeatability(mean_translation_m=1e-5),
-        stiffness=np.array([6e4, 4e4, 3e4, 8e3]),
+        stiffness=np.array([6e4, 4e4, 3e4, 8e3])[:joints],
         notes=(("source", "simulated: no such arm was measured"),),
     )
 
@@ -107,9 +108,9 @@ def scara_cell() -> Cell:
     robot, model = scara.nominal_robot(), scara.nominal_model()
     places = tuple(place for place in scara.TARGETS if place[0] in ("P1", "P4", "P5"))
     reach = np.array([2.1, 2.0, 0.1, 2.7])
-    arcs = tuple(SweepPlan(joint, low, high, 21, ("P1", "P5")) for joint, low, high, *_ in scara.SWEEPS)
-    poses = spread(40, reach)
-    protocol = Protocol(arcs, np.vstack([poses, poses[:15], poses[:15]]), ("P1", "P4"), 10.0, both_ways=True)
+    arcs = tuple(SweepPlan(joint, low, high, ARC + 6, ("P1", "P5")) for joint, low, high, *_ in scara.SWEEPS)
+    poses = spread(POSES, reach)
+    protocol = Protocol(arcs, np.vstack([poses, poses[:AGAIN], poses[:AGAIN]]), ("P1", "P4"), 10.0, both_ways=True)
     whole = scara.cell()
     return replace(
         whole,
