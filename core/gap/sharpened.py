@@ -108,9 +108,13 @@ class Spectrum:
         return np.arange(SPECTRUM_BINS // 4 + 1) / (2 * self.span)
 
     @cached_property
+    def _weights(self) -> Array:
+        return self._waves(self.strength)
+
+    @cached_property
     def _weighed(self) -> Array:
         """Sum of the weights times each wave over their sum; what is constant in errors, placement has taken up."""
-        return self._waves(self.strength)[: len(self.wave)] / self.strength.sum()
+        return self._weights[: len(self.wave)] / self.strength.sum()
 
     @cached_property
     def _pull(self) -> Array:
@@ -126,7 +130,7 @@ class Spectrum:
     @cached_property
     def amplitude(self) -> Array:
         """Of each wave when it is fitted to the errors beside a constant, rad or m."""
-        whole, twice = float(self.strength.sum()), self._waves(self.strength)[: 2 * len(self.wave) : 2]
+        whole, twice = float(self.strength.sum()), self._weights[: 2 * len(self.wave) : 2]
         once = self._weighed
         cosines = (whole + twice.real) / 2 - whole * once.real**2
         sines = (whole - twice.real) / 2 - whole * once.imag**2
@@ -139,7 +143,9 @@ class Spectrum:
         """Size and phase of the steps that stand out; None: none."""
         if self.span < 4 * (COARSEST_STEP_M if self.sliding else COARSEST_STEP_RAD) / 3:
             return None
-        places = _whole_steps(self.wave, self.power, self.amplitude, PEAK, MOST_TRIED)
+        if not self.power.max() > PEAK:
+            return None
+        places = _whole_steps(self.wave, self.power, self.amplitude, MOST_TRIED)
         best = max((self.saw_near(1 / self.wave[k]) for k in places), default=(0.0, 0.0))
         return (best[1], self.sharp_phase(best[1])) if best[0] > 0 else None
 
@@ -176,30 +182,29 @@ class Spectrum:
         return pull**2 / square if SHARES[0] < pull / square < SHARES[1] else 0.0
 
 
-def _whole_steps(wave: Array, power: Array, amplitude: Array, peak: float, most: int) -> np.ndarray:
+def _whole_steps(wave: Array, power: Array, amplitude: Array, most: int) -> np.ndarray:
     """The wave that stands out most, and such as do nearly so and have the amplitude of whole steps of their length.
 
     Where a joint stood at few places, steps of many lengths look alike but for that: a saw-tooth of steps s has a
     fundamental wave of amplitude s / pi.
     """
-    high = np.flatnonzero(power > max(peak, ALIKE * power.max()))
+    high = np.flatnonzero(power > ALIKE * power.max())
     off = np.abs(np.log(np.maximum(np.pi * wave[high] * amplitude[high], 1e-300)))
     return np.unique([*high[np.argsort(off)[: most - 1]], *high[np.argsort(power[high])[-1:]]]).astype(int)
 
 
 def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | None:
     """One size of steps for all turning joints, by the sum of their spectra; None: none stands out."""
-    longest = max(spectra, key=lambda spectrum: spectrum.span)
-    waves = longest.wave
-    total, amplitude, whole = np.zeros(len(waves)), np.zeros(len(waves)), 0.0
-    for spectrum in spectra:
-        place = np.rint(waves * 2 * spectrum.span).astype(int)
-        strength = float(spectrum.strength.sum())
-        total += spectrum.power[place]
-        amplitude += strength * spectrum.amplitude[place]
-        whole += strength
-    places = _whole_steps(waves, total, amplitude / whole, PEAK + 2 * len(spectra), MOST_TRIED_ALIKE)
-    best = max((_alike_near(spectra, 1 / waves[k]) for k in places), default=(0.0, 0.0))
+    waves = max(spectra, key=lambda spectrum: spectrum.span).wave
+    places = [np.rint(waves * 2 * spectrum.span).astype(int) for spectrum in spectra]
+    total = sum(spectrum.power[place] for spectrum, place in zip(spectra, places, strict=True))
+    if not total.max() > PEAK + 2 * len(spectra):
+        return None
+    strengths = [float(spectrum.strength.sum()) for spectrum in spectra]
+    amplitudes = [spectrum.amplitude[place] for spectrum, place in zip(spectra, places, strict=True)]
+    amplitude = np.average(amplitudes, axis=0, weights=strengths)
+    found = _whole_steps(waves, total, amplitude, MOST_TRIED_ALIKE)
+    best = max((_alike_near(spectra, 1 / waves[k]) for k in found), default=(0.0, 0.0))
     return _alike(spectra, best[1]) if best[0] > 0 else None
 
 
