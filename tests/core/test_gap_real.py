@@ -1,4 +1,4 @@
-"""A real arm under a laser tracker: 11 911 poses over 101 hours (UR10, see the data's README). Skipped without the data.
+"""A real arm under a laser tracker: 11 911 poses of a UR10 over 101 hours. Skipped where the data are not at hand.
 
 What holds on every kept-out block is asserted; the figures themselves are for the report.
 """
