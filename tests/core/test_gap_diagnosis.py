@@ -59,7 +59,6 @@ FOUND = (
     ("crane", "linkage:3:0.5%", Place("linkage", joint=3), {}),
     ("scara", "ratio:3:0.1%", Place("ratio", joint=3), {"error_1": 0.001}),
     ("scara", "backlash:3:80um", Place("backlash", joint=3), {}),
-    ("scara", "axis_wobble:2:0.02deg", Place("axis_wobble", joint=2), {}),
 )
 
 

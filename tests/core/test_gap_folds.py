@@ -194,6 +194,23 @@ class TestKeptOut:
         _, after, _ = KeptOut(astray, fold, PRIOR, chosen.groups).fitted(chosen)
         np.testing.assert_allclose(after, before, atol=1e-12)
 
+    def test_noise_leaves_what_is_expected(self) -> None:
+        """Geometry and causes drawn from their priors, and noise: kept-out squares over what is expected of them."""
+        one, fold = problem()
+        one = replace(one, white=replace(one.white, weight=np.where(fold == CHECK, 0.0, 1.0)))
+        chosen, m = chosen_of(one), one.sim.seen.count
+        noise_m2, rng, ratio = np.full(m, 3 * SIGMA_M**2), np.random.default_rng(8), []
+        index, precision = KeptOut(one, fold, PRIOR, chosen.groups).index(chosen)
+        columns = KeptOut(one, fold, PRIOR, chosen.groups).plain[:, :, index]
+        spread = np.where(np.arange(len(index)) < one.placement, 0.01, 1 / np.sqrt(precision))
+        for _ in range(60):
+            drawn = SIGMA_M * rng.normal(size=(m, 3)) + columns @ (spread * rng.normal(size=len(index)))
+            kept = KeptOut(replace(one, residual_m=drawn), fold, PRIOR, chosen.groups)
+            ratio.append(kept.square_m2(chosen) / kept.expected_m2(chosen, noise_m2))
+        assert np.mean(ratio) == pytest.approx(1.0, abs=4 * np.std(ratio) / np.sqrt(60))
+        assert np.std(ratio) < 0.3
+        assert kept.expected_m2(chosen, noise_m2) > 1.1 * 3 * SIGMA_M**2
+
     def test_points_without_weight_are_not_judged_but_validation_rows_are(self) -> None:
         one, fold = problem()
         kept = KeptOut(one, fold, PRIOR, ())
