@@ -42,7 +42,7 @@ class CellView:
         self._viewer, self._bench = viewer, bench
         prepare_stage(viewer.scene)
         self._stations = tuple(Station(name, place) for name, place in bench.rig.stations)
-        self._base = bench.base().base
+        self._base = bench.known.base().base
         self.out_of_sight = False
         """Whether the arm was drawn elsewhere than where anybody looks."""
         self._draw_arms()
@@ -90,7 +90,7 @@ class CellView:
 
     def _stand(self) -> None:
         """Draw the arms anew where the base is found to stand, if that is elsewhere by more than the eye sees."""
-        base = self._bench.base().base
+        base = self._bench.known.base().base
         if np.abs(base - self._base).max() < SEEN_MOVING_M:
             return
         jump = float(np.linalg.norm(base[:3, 3] - self._base[:3, 3]))
@@ -149,7 +149,7 @@ class CellView:
         self.points.mark_last(points[-1] if len(points) else None)
         self.stations.aim(points[-1] if len(points) else None)
         self._show_circle()
-        expected = self._bench.expected()
+        expected = self._bench.known.expected()
         if expected is None:
             self.points.expect(None)
         else:
@@ -158,7 +158,7 @@ class CellView:
     def _show_circle(self) -> None:
         """The circle of the sweep that was measured last, as far as it is known."""
         last = next((s for s in reversed(self._bench.state.shots) if s.taken.phase == "sweep"), None)
-        so_far = None if last is None else self._bench.so_far(last.taken.joint, last.taken.sweep)
+        so_far = None if last is None else self._bench.known.so_far(last.taken.joint, last.taken.sweep)
         if so_far is self._circled:
             return
         self._circled = so_far

@@ -59,7 +59,7 @@ class Dashboard:
         self._draw_page()
         bench.on_change(self.refresh)
         # A solution is not kept but computed again, so that a restart brings it back.
-        self.jobs.ask(bench.solve_again, lambda sentence: None)
+        self.jobs.ask(bench.solving.solve_again, lambda sentence: None)
         self.jobs.when_idle(self._think_ahead)
 
     def _draw_page(self) -> None:
@@ -162,7 +162,7 @@ class Dashboard:
 
     def stop(self) -> None:
         """Close server, worker and session."""
-        self.bench.stop()
+        self.bench.runs.stop()
         self.verify.stop()
         self.seat.close()
         self.jobs.close()
@@ -194,7 +194,7 @@ class Dashboard:
     def _think_ahead(self) -> None:
         """While nobody waits: draw what nobody looks at yet, and have the next solution at hand."""
         self.results.tabs.catch_up()
-        self.bench.solve_ahead()
+        self.bench.solving.solve_ahead()
 
     def _said(self, client: viser.ClientHandle, word: str) -> None:
         """A finding or a row of a table was clicked: show it where it is, and fly there."""

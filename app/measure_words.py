@@ -7,8 +7,8 @@ import numpy as np
 
 from app.clicks import listening, saying
 from app.glossary import term
+from app.sweep_progress import SweepProgress
 from app.words import block
-from app.workbench import SweepProgress
 from core.live_sweep import Verdict
 from core.robot import Robot
 from core.session_events import Event, Judged, Planned, PosesPlanned, Setting, ShotTaken, Skipped

@@ -167,7 +167,7 @@ class PoseBench:
             SessionError: the session is read-only, or there is no target on the last link.
             InstrumentFailed: robot or instrument did not do it; shots that were taken are kept.
         """
-        self._bench.begin_run()
+        self._bench.shooting.begin()
         self._measure(visit, by)
 
     def measure_entered(self, visit: NextVisit, text: str, unit: str, by: str | None = None) -> None:
@@ -177,9 +177,9 @@ class PoseBench:
             InputError: a line is no point, or there are not as many as targets; nothing is kept.
             SessionError, InstrumentFailed: as for ``measure``.
         """
-        count = self._bench.lay_ready(text, unit)
+        count = self._bench.typed.lay_ready(text, unit)
         if count != len(visit.targets):
-            self._bench.lay_ready("", unit)
+            self._bench.typed.lay_ready("", unit)
             names = ", ".join(visit.targets)
             raise InputError(f"{count} points were entered, expected {len(visit.targets)}, one line each: {names}")
         self.measure(visit, by)
@@ -191,9 +191,9 @@ class PoseBench:
         progress: Callable[[int, int], None] | None = None,
     ) -> int:
         """Let the demo robot make every open visit, until done or stopped; how many were made."""
-        self._bench.begin_run()
+        self._bench.shooting.begin()
         made, total = 0, self._open(compensated)
-        while not self._bench.stopped() and (visit := self.next_visit(compensated)) is not None:
+        while not self._bench.shooting.stopped and (visit := self.next_visit(compensated)) is not None:
             self._measure(visit, by)
             made += 1
             if progress is not None:
@@ -224,10 +224,10 @@ class PoseBench:
             start = tuple(float(v) for v in self._bench.centre) if before == sent else None
             number, approach = next_number(self.state), senses(start or before, sent)
         for target in visit.targets:
-            if self._bench.stopped():
+            if self._bench.shooting.stopped:
                 return
             self._standing = self._bench.session, number
-            self._bench.take(sent, start, target, _shot_of(visit, number, target, approach), by)
+            self._bench.shooting.take(sent, start, target, _shot_of(visit, number, target, approach), by)
             start = None
 
     def _compared(self, state: State) -> tuple[PoseLoop | None, str]:

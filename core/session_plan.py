@@ -77,6 +77,11 @@ class Step:
     def key(self) -> StepKey:
         return self.joint, self.sweep, self.step, self.sense, self.target
 
+    @property
+    def sweep_key(self) -> tuple[int, int]:
+        """Joint and number of the sweep that it is a part of."""
+        return self.joint, self.sweep
+
 
 def check_plan(robot: Robot, targets: dict[str, int], plan: Plan) -> None:
     """Refuse a plan that this robot cannot make or these targets (name: link) cannot show.

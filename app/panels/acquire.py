@@ -17,6 +17,7 @@ from app.measure_words import (
 )
 from app.panels.extra_stop import ExtraStop
 from app.panels.typed_points import TypedPoints
+from app.sweep_progress import sweep_progress
 from app.workbench import Workbench
 from core.errors import InputError
 
@@ -62,16 +63,16 @@ class AcquirePanel:
     def refresh(self) -> None:
         """Show where the session stands."""
         bench, state = self._bench, self._bench.state
-        expected = bench.expected()
+        expected = bench.known.expected()
         self._step.content = step_words(
-            state, bench.nominal, not bench.rig.moves_itself, expected, bench.aims(expected)
+            state, bench.nominal, not bench.rig.moves_itself, expected, bench.known.aims(expected)
         )
-        rows = bench.progress()
+        rows = sweep_progress(bench.state)
         self._table.content = sweeps_table(rows, bench.nominal)
         total = sum(row.planned.shots for row in rows)
         self._bar.value = 100.0 * sum(row.planned.shots - row.left for row in rows) / max(total, 1)
         self._verdict.content = self._last_verdict()
-        self._undo.content = undo_words(bench.undo_event(), state)
+        self._undo.content = undo_words(bench.decisions.undo_event(), state)
         self._run_group.visible = self._bar.visible = bench.rig.moves_itself
         self._show_run()
         chosen = None if self._chosen is None else state.shot(self._chosen)
@@ -89,27 +90,27 @@ class AcquirePanel:
         self._chosen = None
         typed = self._typed.take()
         if typed is None:
-            self._ask_at_rest(event, self._bench.measure)
+            self._ask_at_rest(event, self._bench.shooting.measure)
             return
 
         def job() -> None:
-            self._bench.enter(*typed)
+            self._bench.typed.enter(*typed)
             self._typed.clear()
 
         self._ask_at_rest(event, job)
 
     def undo(self, event: object) -> None:
         """Take back the last thing."""
-        self._ask_at_rest(event, self._bench.undo)
+        self._ask_at_rest(event, self._bench.decisions.undo)
 
     def redo(self, event: object) -> None:
         """Bring back what was taken back last."""
-        self._ask_at_rest(event, self._bench.redo)
+        self._ask_at_rest(event, self._bench.decisions.redo)
 
     def skip(self, event: object) -> None:
         """Leave out the next shot."""
         reason = self._said()
-        self._ask_at_rest(event, lambda: self._bench.skip(reason))
+        self._ask_at_rest(event, lambda: self._bench.decisions.skip(reason))
 
     def measure_again(self, event: object) -> None:
         """Measure the chosen shot, or the last one, again."""
@@ -119,29 +120,29 @@ class AcquirePanel:
         self._chosen = None
 
         def job() -> None:
-            if typed is not None and self._bench.lay_ready(*typed) != 1:
+            if typed is not None and self._bench.typed.lay_ready(*typed) != 1:
                 raise InputError("one shot is measured again, expected one line of coordinates")
-            self._bench.measure_again(number)
+            self._bench.shooting.measure_again(number)
             self._typed.clear()
 
         self._ask_at_rest(event, job)
 
     def pause(self, event: object) -> None:
         """Pause a run, or go on with one that was paused."""
-        if self._bench.running is not None:
-            self._now(event, self._bench.pause)
-        elif self._bench.paused is not None:
-            self._start(event, self._bench.paused)
+        if self._bench.runs.running is not None:
+            self._now(event, self._bench.runs.pause)
+        elif self._bench.runs.paused is not None:
+            self._start(event, self._bench.runs.paused)
 
     def stop(self, event: object) -> None:
         """Stop a run at once, or give up one that was paused."""
-        self._now(event, self._bench.stop)
+        self._now(event, self._bench.runs.stop)
 
     def heard(self, event: object, word: str) -> None:
         """A row of the table was clicked: go on with that sweep."""
         joint, _, sweep = word.removeprefix(SWEEP_WORD).partition("-")
         if word.startswith(SWEEP_WORD) and joint.isdecimal() and sweep.isdecimal():
-            self._ask_at_rest(event, lambda: self._bench.go_to(int(joint), int(sweep)))
+            self._ask_at_rest(event, lambda: self._bench.decisions.go_to(int(joint), int(sweep)))
 
     def _run(self, event: viser.GuiEvent) -> None:
         asked = self._run_group.value
@@ -161,7 +162,7 @@ class AcquirePanel:
 
         def job() -> None:
             self._began, self._done, self._total = time.monotonic(), 0, 0
-            self._bench.run(whole_plan, progress=progress)
+            self._bench.runs.run(whole_plan, progress=progress)
 
         self._ask_at_rest(event, job)
 
@@ -175,13 +176,13 @@ class AcquirePanel:
         if asked == "Measure again":
             self.measure_again(event)
         elif asked == "Exclude":
-            self._ask_at_rest(event, lambda: self._bench.exclude(number, reason))
+            self._ask_at_rest(event, lambda: self._bench.decisions.exclude(number, reason))
         else:
-            self._ask_at_rest(event, lambda: self._bench.include(number))
+            self._ask_at_rest(event, lambda: self._bench.decisions.include(number))
 
     def _ask_at_rest(self, event: object, act: Callable[[], object]) -> None:
         """Ask for something that cannot be done while the robot runs."""
-        if self._bench.running is not None:
+        if self._bench.runs.running is not None:
             self._ask(event, _refuse(RUNNING), at_once=True)
         else:
             self._ask(event, lambda client: act())
@@ -210,13 +211,13 @@ class AcquirePanel:
         last = next((s for s in reversed(self._bench.state.shots) if s.taken.phase == "sweep"), None)
         if last is None:
             return verdict_words(None, False, None, None)
-        so_far = self._bench.so_far(last.taken.joint, last.taken.sweep)
+        so_far = self._bench.known.so_far(last.taken.joint, last.taken.sweep)
         slides = bool(self._bench.nominal.sliding[last.taken.joint - 1])
-        return verdict_words(so_far, slides, self._bench.tool_std_m(so_far), self._bench.state.instrument.sigma_m)
+        return verdict_words(so_far, slides, self._bench.known.tool_std_m(so_far), self._bench.state.instrument.sigma_m)
 
     def _show_run(self) -> None:
-        spent = time.monotonic() - self._began
-        self._running.content = run_words(self._bench.running, self._bench.paused, self._done, self._total, spent)
+        runs, spent = self._bench.runs, time.monotonic() - self._began
+        self._running.content = run_words(runs.running, runs.paused, self._done, self._total, spent)
 
 
 def _refuse(sentence: str) -> Callable[[object], None]:

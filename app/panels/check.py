@@ -66,10 +66,10 @@ class CheckPanel:
         def job(client: object) -> None:
             count = SHOTS
             if not self._bench.rig.moves_itself:
-                count = self._bench.lay_ready(*typed)
+                count = self._bench.typed.lay_ready(*typed)
                 if count < 2:
                     raise InputError(f"{count} shots are typed, expected two or more lines x y z")
-            self._bench.check_instrument(target, count)
+            self._bench.shooting.check_instrument(target, count)
             self._typed.value = ""
 
         self._ask(event, job)

@@ -30,7 +30,7 @@ class ExportPanel:
 
     def refresh(self) -> None:
         """Say whether there is something to export."""
-        self._intro.content = intro_words(self._bench.calibration is not None, self._bench.since_solved)
+        self._intro.content = intro_words(self._bench.calibration is not None, self._bench.solving.since_solved)
 
     def _button(self, gui: viser.GuiApi, export: Export) -> None:
         button = gui.add_button(export.label, icon=viser.Icon.DOWNLOAD, hint=export.hint)

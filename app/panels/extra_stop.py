@@ -45,7 +45,7 @@ class ExtraStop:
             if not isinstance(at, int | float) or not np.isfinite(at):
                 raise InputError(f"the command is {at!r}, expected a number")
             scale = display_unit(bool(self._bench.nominal.sliding[row.joint - 1]))[1]
-            self._bench.measure_extra(row.joint, row.sweep, at / scale)
+            self._bench.shooting.measure_extra(row.joint, row.sweep, at / scale)
 
         self._ask(event, act)
 

@@ -126,10 +126,10 @@ class ResultsPanel:
             self._live.clear()
             return
         joint = last.taken.joint
-        live, shots = self._bench.live(joint, last.taken.sweep)
-        command = np.array([s.taken.commanded[joint - 1] for s in shots])
+        so_far = self._bench.known.so_far(joint, last.taken.sweep)
+        command = np.array([s.taken.commanded[joint - 1] for s in so_far.shots])
         sliding = bool(self._bench.nominal.sliding[joint - 1])
-        self._live.show(live_figure(live, command, joint, sliding, WIDTH_PX), live.waiting_for)
+        self._live.show(live_figure(so_far.live, command, joint, sliding, WIDTH_PX), so_far.live.waiting_for)
 
     def _draw_residuals(self) -> None:
         found = self.drawn

@@ -48,7 +48,7 @@ class SolvePanel:
         def job(client: object) -> None:
             self._busy.content = block("<p class='soft'>Solving …</p>", "solving")
             try:
-                self._bench.solve()
+                self._bench.solving.solve()
             finally:
                 self._busy.content = ""
 
@@ -59,7 +59,7 @@ class SolvePanel:
         bench, state = self._bench, self._bench.state
         for key, box in self._families.items():
             box.value = str(state.settings.get(key, AS_DESIGNED))
-        found, since, limits = bench.calibration, bench.since_solved, limits_of(state.settings)
+        found, since, limits = bench.calibration, bench.solving.since_solved, limits_of(state.settings)
         last = state.solves[-1] if state.solves else None
         shown = since, limits, None if last is None else last.id, bool(state.shots)
         if found is self._found and shown == self._shown:

@@ -43,7 +43,7 @@ class TypedPoints:
 
             def job(client: viser.ClientHandle | None) -> None:
                 with as_file(upload) as path:
-                    count = self._bench.enter_file(path)
+                    count = self._bench.typed.enter_file(path)
                 if client is not None:
                     text = f"{count} shots from {path.name} are in the session."
                     client.add_notification("Points taken over", text, color="green", auto_close_seconds=6)

@@ -154,13 +154,13 @@ class VerifyPanel:
 
     def _run(self, event: viser.GuiEvent) -> None:
         if self._run_group.value == "Stop":
-            self._ask(event, lambda client: self._bench.stop(), at_once=True)
+            self._ask(event, lambda client: self._bench.runs.stop(), at_once=True)
             return
         way = WAYS.get(self._way.value)
         self._ask(event, lambda client: self._poses.run(way))
 
     def _undo_or_redo(self, event: viser.GuiEvent) -> None:
-        act = self._bench.undo if self._history.value == "Undo" else self._bench.redo
+        act = self._bench.decisions.undo if self._history.value == "Undo" else self._bench.decisions.redo
         self._ask(event, lambda client: act())
 
     def _measure_again(self, event: viser.GuiEvent) -> None:

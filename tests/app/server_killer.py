@@ -63,8 +63,8 @@ def begin(path: Path) -> None:
     """A session in which two sweeps were measured, so that there is something to solve."""
     with Session.create(path, demo_events(irb_l6.cell()), by="killer") as session:
         bench = Workbench(session)
-        bench.run(False)
-        bench.run(False)
+        bench.runs.run(False)
+        bench.runs.run(False)
 
 
 def one_round(path: Path, number: int, rng: random.Random, summary: Summary, known: dict[int, bytes]) -> None:
@@ -153,7 +153,7 @@ def act(dashboard: Dashboard, what: str, rng: random.Random, tell) -> None:
         dashboard.ask(None, lambda client: tell("exported"), operator=False)
     elif what == "exclude" and bench.state.shots:
         number = rng.choice(bench.state.shots).id
-        dashboard.ask(None, lambda client: bench.exclude(number, "killed for it"))
+        dashboard.ask(None, lambda client: bench.decisions.exclude(number, "killed for it"))
     else:
         {"measure": acquire.measure, "undo": acquire.undo, "redo": acquire.redo}.get(what, dashboard.solve.solve)(None)
 
@@ -196,8 +196,8 @@ def page_of(path: Path) -> str:
     """What the page has to say of the step that the session is at."""
     with Session.open(path, read_only=True) as session:
         bench = Workbench(session)
-        expected = bench.expected()
-        words = step_words(session.state, bench.nominal, False, expected, bench.aims(expected))
+        expected = bench.known.expected()
+        words = step_words(session.state, bench.nominal, False, expected, bench.known.aims(expected))
     return words.replace("\n", " ")
 
 

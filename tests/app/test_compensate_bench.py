@@ -24,8 +24,8 @@ def bench(tmp_path_factory):
     cell = irb_l6.cell()
     path = tmp_path_factory.mktemp("solved") / f"a{SUFFIX}"
     one = Workbench(Session.create(path, demo_events(cell), by="A. Operator"), cell)
-    one.run(True)
-    one.solve()
+    one.runs.run(True)
+    one.solving.solve()
     yield one
     one.session.close()
 
@@ -119,8 +119,8 @@ def test_commands_of_an_earlier_solution_are_marked(ready, bench):
     text, _ = random_poses(ready, 2)
     ready.compensate(text.encode(), "poses.csv")
     assert not ready.outdated
-    bench.exclude(bench.state.shots[7].id, "target was bumped")
-    bench.solve()
+    bench.decisions.exclude(bench.state.shots[7].id, "target was bumped")
+    bench.solving.solve()
     assert ready.outdated
     assert "earlier solution" in summary_words(ready.last, ready.outdated)
 

@@ -53,9 +53,9 @@ def test_a_new_session_has_not_points_enough(tmp_path):
     gaps = GapBench(bench)
     for taken in range(LEAST_POINTS):
         assert not gaps.enough, taken
-        bench.measure()
+        bench.shooting.measure()
     assert gaps.enough
-    bench.exclude(bench.state.shots[0].id, "bumped")
+    bench.decisions.exclude(bench.state.shots[0].id, "bumped")
     assert not gaps.enough
     session.close()
 
@@ -70,7 +70,7 @@ def test_the_session_is_diagnosed_and_grows_old_when_it_changes(bench, asked):
     assert asked[0][0].measurements.count == 165
     assert "nominal" in gaps.found.of
     assert not gaps.outdated
-    bench.exclude(bench.state.shots[3].id, "bumped")
+    bench.decisions.exclude(bench.state.shots[3].id, "bumped")
     assert gaps.outdated
 
 
@@ -78,7 +78,7 @@ def test_the_last_solution_may_be_the_sim(bench, asked):
     gaps = GapBench(bench)
     with pytest.raises(InputError, match="solve first"):
         gaps.diagnose(True)
-    bench.solve()
+    bench.solving.solve()
     gaps.diagnose(True)
     assert asked[0][1] is gaps.arm
     assert gaps.arm.robot.joint_count == 6
@@ -89,7 +89,7 @@ def test_an_uploaded_campaign_is_its_own_matter(bench, asked):
     gaps.diagnose_archive(packed(sample()), "mine.zip")
     assert gaps.found.of == "mine.zip"
     assert gaps.found.shots is None
-    bench.exclude(bench.state.shots[3].id, "bumped")
+    bench.decisions.exclude(bench.state.shots[3].id, "bumped")
     assert not gaps.outdated
     with pytest.raises(InputError, match=r"odd\.zip cannot be unpacked"):
         gaps.diagnose_archive(b"no archive", "odd.zip")

@@ -8,6 +8,7 @@ import pytest
 
 from app.measure_words import entered_words, run_words, shot_words, step_words, sweeps_table, undo_words, verdict_words
 from app.rigs import SETTING
+from app.sweep_progress import sweep_progress
 from app.workbench import Workbench
 from core.session import Session
 from core.session_events import Planned, PosesPlanned, Setting, TargetEntry, TargetsNamed
@@ -26,14 +27,14 @@ def bench(tmp_path):
 
 
 def step_of(bench: Workbench, by_hand: bool = False) -> str:
-    expected = bench.expected()
-    return plain(step_words(bench.state, bench.nominal, by_hand, expected, bench.aims(expected)))
+    expected = bench.known.expected()
+    return plain(step_words(bench.state, bench.nominal, by_hand, expected, bench.known.aims(expected)))
 
 
 def verdict_of(bench: Workbench, joint: int) -> str:
-    so_far = bench.so_far(joint, 1)
+    so_far = bench.known.so_far(joint, 1)
     slides = bool(bench.nominal.sliding[joint - 1])
-    return plain(verdict_words(so_far, slides, bench.tool_std_m(so_far), bench.state.instrument.sigma_m))
+    return plain(verdict_words(so_far, slides, bench.known.tool_std_m(so_far), bench.state.instrument.sigma_m))
 
 
 def plain(html: str) -> str:
@@ -48,7 +49,7 @@ def test_a_step_says_command_place_reason_and_what_comes_next(bench):
     assert re.search(r"left: hz \d+\.\d{3}°, v \d+\.\d{3}°", text)
     assert "Only joint 6 moves" in text
     assert "Next: stop 2." in text
-    bench.go_to(2, 1)
+    bench.decisions.go_to(2, 1)
     text = step_of(bench)
     assert "The target was not seen before" in text
     assert "its motor stands still" in text
@@ -74,19 +75,19 @@ def test_by_hand_the_first_stop_of_a_pass_is_reached_from_beyond(bench):
 def test_a_return_pass_is_told(bench):
     row = PlannedSweep(6, 1, -0.4, 0.4, 2, ("T1",), both_ways=True)
     bench.session.append(Planned((row,), bench.state.plan.home))
-    bench.measure()
-    bench.measure()
+    bench.shooting.measure()
+    bench.shooting.measure()
     assert "return pass" in step_of(bench)
     assert "It is the last shot of the plan" not in step_of(bench)
-    bench.measure()
+    bench.shooting.measure()
     assert "It is the last shot of the plan" in step_of(bench)
 
 
 def test_when_nothing_is_left_it_says_why_and_where_to_go(bench):
     assert "No sweep is planned" in plain(step_words(State(), bench.nominal, False, None))
     bench.session.append(Planned((PlannedSweep(6, 1, -0.4, 0.4, 2, ("T1",)),), bench.state.plan.home))
-    bench.measure()
-    bench.skip("sight was blocked")
+    bench.shooting.measure()
+    bench.decisions.skip("sight was blocked")
     text = step_of(bench)
     assert "Go to 3 Solve" in text
     assert "1 skipped" in text
@@ -95,11 +96,11 @@ def test_when_nothing_is_left_it_says_why_and_where_to_go(bench):
 
 
 def test_the_table_counts_and_can_be_clicked(bench):
-    bench.measure()
-    bench.skip("sight was blocked")
-    bench.measure_extra(6, 1, bench.state.plan.home[5])
-    bench.exclude(bench.state.shots[0].id, "a cloud")
-    html = sweeps_table(bench.progress(), bench.nominal)
+    bench.shooting.measure()
+    bench.decisions.skip("sight was blocked")
+    bench.shooting.measure_extra(6, 1, bench.state.plan.home[5])
+    bench.decisions.exclude(bench.state.shots[0].id, "a cloud")
+    html = sweeps_table(sweep_progress(bench.state), bench.nominal)
     assert html.count("data-say=") == 6
     assert "data-say='sweep-6-1'" in html
     assert "1 skipped, 1 extra, 1 out" in plain(html)
@@ -111,32 +112,32 @@ def test_the_table_counts_and_can_be_clicked(bench):
 def test_sliding_joints_are_told_in_millimetres(tmp_path):
     with Session.create(tmp_path / f"s{SUFFIX}", demo_events(scara.cell())) as session:
         bench = Workbench(session)
-        assert "220mm" in sweeps_table(bench.progress(), bench.nominal)
-        bench.go_to(3, 1)
+        assert "220mm" in sweeps_table(sweep_progress(bench.state), bench.nominal)
+        bench.decisions.go_to(3, 1)
         assert "q3 = -110.000 mm" in step_of(bench)
         for _ in range(3):
-            bench.measure()
+            bench.shooting.measure()
         assert "If you stop now: direction of axis 3 known to" in verdict_of(bench, 3)
         assert "off the line so far" in verdict_of(bench, 3)
 
 
 def test_too_short_an_arc_says_how_long_it_must_be(bench):
     for _ in range(3):
-        bench.measure()
+        bench.shooting.measure()
     assert "3 of at least 4 shots" in verdict_of(bench, 6)
     for _ in range(2):
-        bench.measure()
+        bench.shooting.measure()
     text = verdict_of(bench, 6)
-    assert bench.so_far(6, 1).live.fit is None
+    assert bench.known.so_far(6, 1).live.fit is None
     assert re.search(
         r"5 shots over 12\.5° cannot be told from a straight line\. The arc has to reach about \d+°: \d+ more", text
     )
 
 
 def test_a_shot_is_told_against_the_axis_and_its_prediction(bench):
-    bench.run(False)
+    bench.runs.run(False)
     text = verdict_of(bench, 6)
-    fit = bench.so_far(6, 1).live.fit
+    fit = bench.known.so_far(6, 1).live.fit
     axial = f"{abs(fit.axial_m[-1] * 1e3):.2f} mm"
     assert "Stop 17 of joint 6: axial" in text
     assert axial in text
@@ -150,15 +151,15 @@ def test_before_any_shot_it_says_what_to_press():
 
 
 def test_undo_says_what_it_takes_back(bench):
-    assert "Nothing to undo" in plain(undo_words(bench.undo_event(), bench.state))
-    bench.measure()
-    assert "the shot of joint 6, stop 1, target T1" in undo_words(bench.undo_event(), bench.state)
-    bench.exclude(bench.state.shots[0].id, "a cloud")
-    assert "that record 1 is excluded" in undo_words(bench.undo_event(), bench.state)
-    bench.skip("x")
-    assert "the skipping of joint 6, stop 2" in undo_words(bench.undo_event(), bench.state)
+    assert "Nothing to undo" in plain(undo_words(bench.decisions.undo_event(), bench.state))
+    bench.shooting.measure()
+    assert "the shot of joint 6, stop 1, target T1" in undo_words(bench.decisions.undo_event(), bench.state)
+    bench.decisions.exclude(bench.state.shots[0].id, "a cloud")
+    assert "that record 1 is excluded" in undo_words(bench.decisions.undo_event(), bench.state)
+    bench.decisions.skip("x")
+    assert "the skipping of joint 6, stop 2" in undo_words(bench.decisions.undo_event(), bench.state)
     bench.session.append(Setting("transmission_6", "direct"))
-    assert "the choice of transmission 6" in undo_words(bench.undo_event(), bench.state)
+    assert "the choice of transmission 6" in undo_words(bench.decisions.undo_event(), bench.state)
 
 
 def test_a_run_tells_how_far_it_is(bench):
@@ -182,12 +183,12 @@ def test_names_from_people_are_escaped(tmp_path):
     events += [TargetsNamed((TargetEntry(name, 6),)), Planned((PlannedSweep(6, 1, -0.2, 0.2, 5, (name,)),))]
     with Session.create(tmp_path / f"x{SUFFIX}", events, by=name) as session:
         bench = Workbench(session)
-        bench.enter("1 2 3", "mm")
-        bench.exclude(bench.state.shots[0].id, name, by=name)
+        bench.typed.enter("1 2 3", "mm")
+        bench.decisions.exclude(bench.state.shots[0].id, name, by=name)
         pieces = (
             step_words(bench.state, bench.nominal, True, None),
-            sweeps_table(bench.progress(), bench.nominal),
-            undo_words(bench.undo_event(), bench.state),
+            sweeps_table(sweep_progress(bench.state), bench.nominal),
+            undo_words(bench.decisions.undo_event(), bench.state),
             shot_words(bench.state.shots[0], True),
         )
     assert not any("<img" in piece for piece in pieces)

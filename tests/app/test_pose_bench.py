@@ -40,7 +40,7 @@ def solved(tmp_path_factory):
     cell = irb_l6.cell()
     path = tmp_path_factory.mktemp("solved") / f"a{SUFFIX}"
     one = Workbench(Session.create(path, demo_events(cell), by="A. Operator"), cell)
-    one.run(True)
+    one.runs.run(True)
     one.session.close()
     return path
 
@@ -50,7 +50,7 @@ def ready(solved, tmp_path):
     path = tmp_path / f"b{SUFFIX}"
     path.write_bytes(solved.read_bytes())
     one = Workbench(Session.open(path), irb_l6.cell())
-    one.solve()
+    one.solving.solve()
     yield one
     one.session.close()
 
@@ -68,7 +68,7 @@ def test_before_a_solution_poses_go_by_nominal_commands_only(bench, poses):
         ("pose", 0, name, True, None) for name in ("T1", "T5", "T6")
     ]
     assert len({t.approach for t in taken}) == 1
-    assert taken[0].approach == tuple(np.sign(np.subtract(visit.commanded, bench.cell.home)).astype(int))
+    assert taken[0].approach == tuple(np.sign(np.subtract(visit.commanded, bench.rig.cell.home)).astype(int))
     assert poses.next_visit().pose.number == 2
     loop, why = poses.loop()
     assert loop is None
@@ -102,7 +102,7 @@ def test_a_visit_goes_on_after_undo_while_the_robot_stands_there(ready):
     poses = PoseBench(ready)
     poses.measure(poses.next_visit())
     where = ready.robot.points_m()
-    ready.undo()
+    ready.decisions.undo()
     visit = poses.next_visit()
     assert (visit.pose.number, visit.targets) == (1, ("T6",))
     poses.measure(visit)
@@ -114,7 +114,7 @@ def test_a_visit_goes_on_after_undo_while_the_robot_stands_there(ready):
 def test_a_visit_that_was_left_is_made_anew_from_elsewhere(ready):
     poses = PoseBench(ready)
     poses.measure(poses.next_visit())
-    ready.undo()
+    ready.decisions.undo()
     again = PoseBench(ready)
     visit = again.next_visit()
     assert (visit.pose.number, visit.targets) == (1, ("T1", "T5", "T6"))
@@ -130,11 +130,11 @@ def test_after_a_restart_it_goes_on_with_the_next_pose(ready):
         poses.measure(poses.next_visit())
     path = ready.session.path
     ready.session.close()
-    again = Workbench(Session.open(path), ready.cell)
+    again = Workbench(Session.open(path), ready.rig.cell)
     try:
         assert PoseBench(again).next_visit().pose.number == 4
         assert PoseBench(again).loop()[0] is None
-        again.solve()
+        again.solving.solve()
         assert PoseBench(again).loop()[0].nominal.count == 3
     finally:
         again.session.close()
@@ -142,7 +142,7 @@ def test_after_a_restart_it_goes_on_with_the_next_pose(ready):
 
 def test_stop_ends_a_run_after_the_shot_in_progress(ready):
     poses = PoseBench(ready)
-    ready.on_change(lambda: ready.stop() if len(ready.state.shots) == 129 + 4 else None)
+    ready.on_change(lambda: ready.runs.stop() if len(ready.state.shots) == 129 + 4 else None)
     assert poses.run() == 2
     assert [len(v.seen) for v in pose_visits(ready.state)] == [3, 1]
     poses.measure(poses.next_visit())
@@ -150,7 +150,7 @@ def test_stop_ends_a_run_after_the_shot_in_progress(ready):
 
 
 def test_a_failure_in_the_middle_keeps_what_was_shot(ready, monkeypatch):
-    poses, real, count = PoseBench(ready), ready.desk.meter.measure, []
+    poses, real, count = PoseBench(ready), ready.rig.meter.measure, []
 
     def fail(request, cancelled):
         count.append(request.target)
@@ -158,7 +158,7 @@ def test_a_failure_in_the_middle_keeps_what_was_shot(ready, monkeypatch):
             raise InstrumentFailed("the reflector is not in sight; aim again")
         return real(request, cancelled)
 
-    monkeypatch.setattr(ready.desk.meter, "measure", fail)
+    monkeypatch.setattr(ready.rig.meter, "measure", fail)
     with pytest.raises(InstrumentFailed):
         poses.measure(poses.next_visit())
     assert poses.next_visit().targets == ("T5", "T6")
@@ -171,8 +171,8 @@ def test_a_new_solution_makes_old_compensated_visits_outdated(ready):
     poses = PoseBench(ready)
     poses.run()
     assert not any(pose.outdated for pose in poses.poses())
-    ready.exclude(ready.state.shots[5].id, "target was bumped")
-    ready.solve()
+    ready.decisions.exclude(ready.state.shots[5].id, "target was bumped")
+    ready.solving.solve()
     assert all(pose.outdated for pose in poses.poses())
     assert poses.loop()[0].compensated.count == 12
 
@@ -181,13 +181,13 @@ def test_an_excluded_shot_leaves_too_little_of_its_pose_for_its_orientation(read
     poses = PoseBench(ready)
     poses.run(False)
     shot = next(s for s in ready.state.shots if s.taken.phase == "pose" and s.taken.target == "T5")
-    ready.exclude(shot.id, "target was bumped")
+    ready.decisions.exclude(shot.id, "target was bumped")
     assert poses.next_visit(False).pose.number == 1
     assert poses.loop()[0].nominal.errors.orientation.count == 11
 
 
 def test_poses_that_the_arm_cannot_compensate_are_named_and_passed_over(ready):
-    low, high = np.array([joint.limits for joint in ready.cell.robot.joints]).T
+    low, high = np.array([joint.limits for joint in ready.rig.cell.robot.joints]).T
     edge = (float(high[0]), *ready.state.poses.wanted[0][1:])
     inside = ready.state.poses.wanted[1]
     ready.session.append(PosesPlanned((edge, inside), ("T1", "T5", "T6")))
@@ -209,7 +209,7 @@ def test_new_poses_take_the_place_of_the_old_ones_but_visits_stay(ready):
     shown = poses.poses()
     assert len(shown) == 17
     assert [p.nominal_visit is not None for p in shown] == [False] * 5 + [True] * 12
-    ready.undo()
+    ready.decisions.undo()
     assert len(ready.state.poses.wanted) == 12
     with pytest.raises(InputError, match="expected 1 to 1000"):
         poses.plan(0)

@@ -76,19 +76,19 @@ def test_a_built_in_cell_is_known_by_its_robot(tmp_path, cell):
 def test_an_own_robot_is_measured_by_hand_unless_it_is_simulated(bench):
     said = bench.state.settings.get(SETTING)
     assert bench.rig.source == (said or "by hand")
-    assert (bench.cell is None) == (said != "simulated")
+    assert (bench.rig.cell is None) == (said != "simulated")
     assert bench.nominal.name == "three"
     assert bench.nominal_net(bench.robot.commanded).shape == (3,)
-    assert bench.base().settled == (said == "simulated")
+    assert bench.known.base().settled == (said == "simulated")
 
 
 def test_a_simulated_arm_of_the_own_robot_is_calibrated(tmp_path):
     with own_session(tmp_path / "a.trueaxis", Source.SIMULATED) as session:
         bench = Workbench(session)
-        assert bench.run(True) == sum(row.shots for row in bench.state.plan.sweeps)
-        found = bench.solve()
+        assert bench.runs.run(True) == sum(row.shots for row in bench.state.plan.sweeps)
+        found = bench.solving.solve()
         assert found.not_swept == ()
-        assert np.abs(bench.base().base - bench.cell.truth.base).max() < 0.02
+        assert np.abs(bench.known.base().base - bench.rig.cell.truth.base).max() < 0.02
 
 
 def test_the_rig_follows_what_the_session_says(tmp_path):
@@ -109,9 +109,9 @@ def test_by_hand_a_shot_needs_its_coordinates(tmp_path):
     with own_session(tmp_path / "a.trueaxis", None) as session:
         bench = Workbench(session)
         with pytest.raises(InstrumentFailed, match="no coordinates of target 'T1' were entered"):
-            bench.measure()
+            bench.shooting.measure()
         bench.rig.meter.enter([Reading((1.0, 2.0, 3.0))])
-        assert bench.measure().taken.point_m == (1.0, 2.0, 3.0)
+        assert bench.shooting.measure().taken.point_m == (1.0, 2.0, 3.0)
         # The arm is drawn where it has to be sent.
         assert bench.robot.commanded == bench.state.shots[0].taken.commanded
 
@@ -130,7 +130,7 @@ def test_what_is_simulated_says_so_in_every_report(tmp_path):
     with own_session(tmp_path / "a.trueaxis", None) as session:
         session.append_all(source_events(Source.SIMULATED, "three"))
         bench = Workbench(session)
-        bench.run(False)
+        bench.runs.run(False)
         assert to_campaign(bench.state).notes["source"] == "simulated: no three was measured"
     with own_session(tmp_path / "b.trueaxis", Source.SIMULATED) as session:
         session.append_all(source_events(Source.BY_HAND, "three"))

@@ -9,6 +9,7 @@ from zipfile import ZipFile
 import pytest
 
 from app.dashboard import Dashboard
+from app.sweep_progress import sweep_progress
 from app.workbench import Workbench
 from core.session import Session
 from core.session_events import OperatorNamed
@@ -122,7 +123,7 @@ def test_from_an_empty_cell_to_an_exported_report(page, dashboard):
 
     group(page, "Run all")
     wait_for_text(page, "step", "Nothing left to measure")
-    assert all(row.finished for row in bench.progress())
+    assert all(row.finished for row in sweep_progress(bench.state))
 
     tab(page, "3 Solve")
     press(page, "Solve")

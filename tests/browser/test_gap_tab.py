@@ -78,7 +78,7 @@ def test_the_tab_comes_with_the_points(chromium, tmp_path):  # noqa: F811
     try:
         assert page.get_by_role("tab", name="Gap").count() == 0
         for _ in range(LEAST_POINTS):
-            running.bench.measure()
+            running.bench.shooting.measure()
         page.get_by_role("tab", name="Gap").first.wait_for()
     finally:
         page.close()
@@ -120,7 +120,7 @@ def test_shots_that_are_left_out_afterwards_make_it_old(page, dashboard, diagnos
     page.get_by_role("tab", name="Gap").first.click()
     press(page, "Diagnose")
     wait_for_text(page, "gap-verdict", "explained")
-    dashboard.bench.exclude(dashboard.bench.state.shots[0].id, "bumped")
+    dashboard.bench.decisions.exclude(dashboard.bench.state.shots[0].id, "bumped")
     wait_for_text(page, "gap-verdict", "diagnose again")
 
 

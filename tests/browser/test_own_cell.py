@@ -136,7 +136,7 @@ def test_a_robot_from_a_file_is_measured_by_hand_and_solved(page, dashboard):
         press(page, "Measure")
         wait_for_text(page, "step", "Nothing left" if joint == 1 else "Joint 1")
     assert len(bench.state.shots) == 48
-    assert bench.base().settled
+    assert bench.known.base().settled
     tab(page, "3 Solve")
     press(page, "Solve")
     page.wait_for_selector("[data-testid=noise]")

@@ -29,8 +29,8 @@ def dashboard(tmp_path_factory):
     cell = irb_l6.cell()
     path = tmp_path_factory.mktemp("review") / f"demo{SUFFIX}"
     running = Dashboard(Workbench(Session.create(path, demo_events(cell), by="A. Operator"), cell))
-    running.bench.run(True)
-    running.bench.solve()
+    running.bench.runs.run(True)
+    running.bench.solving.solve()
     yield running
     running.stop()
 
@@ -131,19 +131,19 @@ def test_a_tab_that_was_closed_shows_the_new_solution_when_it_is_opened(page, da
     page.wait_for_function(f"() => ({PLOT})().includes('Joint 1')")
     tab(page, "This sweep")
     shot = dashboard.bench.state.shots[3]
-    dashboard.bench.exclude(shot.id, "a test")
-    found = dashboard.bench.solve()
+    dashboard.bench.decisions.exclude(shot.id, "a test")
+    found = dashboard.bench.solving.solve()
     # Nobody asked through the page, so that the worker did not think ahead.
     tab(page, "Residuals")
     wait_for_text(page, "residuals", "16 points")
     assert dashboard.results.drawn is found
-    dashboard.bench.include(shot.id)
-    dashboard.bench.solve()
+    dashboard.bench.decisions.include(shot.id)
+    dashboard.bench.solving.solve()
 
 
 def test_a_point_is_chosen_by_a_click_excluded_and_brought_back(page, dashboard):
     bench = dashboard.bench
-    again = bench.measure_again(bench.state.shots[40].id)
+    again = bench.shooting.measure_again(bench.state.shots[40].id)
     kept = sum(shot.counts for shot in bench.state.shots)
     page.wait_for_function(f"() => ({POINTS})() === {kept}")
     point = np.array(again.taken.point_m)

@@ -26,7 +26,7 @@ def measured(tmp_path_factory):
     """A session in which table 1 was measured."""
     path = tmp_path_factory.mktemp("measured") / f"demo{SUFFIX}"
     running = started(path)
-    running.bench.run(True)
+    running.bench.runs.run(True)
     running.stop()
     return path
 
@@ -156,7 +156,7 @@ def test_limits_give_a_verdict_and_undo_takes_shots_back(page, dashboard):
     group(page, "Undo")
     page.wait_for_function("() => !document.querySelector('[data-testid=pose-verdict]')")
     for _ in range(3):
-        dashboard.bench.undo()
+        dashboard.bench.decisions.undo()
     wait_for_text(page, "verify-step", "Pose 12 of 12, compensated command")
     assert len(dashboard.bench.state.shots) == before - 3
 
