@@ -55,8 +55,11 @@ def displacements(
     target = np.zeros(k, dtype=int) if target is None else np.unique(target, return_inverse=True)[1]
     if len(fit.used) != k or len(stop) != k or len(target) != k:
         raise InputError(f"{k} points need as many stops, targets and fitted points")
-    count = int(stop.max()) + 1
     command = None if commanded is None else np.asarray(commanded, dtype=float)
+    # At the last stops other targets may have been seen alone, as while a sweep is being measured.
+    count = int(stop.max()) + 1 if command is None else len(command)
+    if count <= stop.max():
+        raise InputError(f"stop {int(stop.max())} has no command, expected one for each stop from 0 on")
     readings, effect, weight = _readings(fit, points)
     if not fit.sliding:
         readings = _unwrapped(readings, stop, target, command)

@@ -170,6 +170,15 @@ class TestNoise:
         found = displacements(fit, points, stop=stop, target=target, commanded=self.TRUE)
         np.testing.assert_allclose(found.value, self.TRUE, atol=1e-9)
 
+    def test_stops_at_the_end_that_no_point_was_seen_at_are_there_without_a_value(self):
+        points, target, stop = sweep(self.LINE, self.TRUE, self.PLACES[:1])
+        fit = fit_axis(points[:-2], target=target[:-2], stop=stop[:-2])
+        found = displacements(fit, points[:-2], stop=stop[:-2], target=target[:-2], commanded=self.TRUE)
+        assert found.value.shape == found.std.shape == self.TRUE.shape
+        assert found.axis_effect.shape == (len(self.TRUE), 4)
+        assert np.flatnonzero(np.isnan(found.value)).tolist() == [len(self.TRUE) - 2, len(self.TRUE) - 1]
+        np.testing.assert_allclose(found.value[:-2], self.TRUE[:-2], atol=1e-9)
+
 
 def test_shapes_that_do_not_fit_are_refused():
     points, _, _ = sweep(Line(np.zeros(3), np.eye(3)[2]), np.linspace(0, 1, 6), [np.array([0.3, 0, 0])])
@@ -178,3 +187,5 @@ def test_shapes_that_do_not_fit_are_refused():
         displacements(fit, points[:5])
     with pytest.raises(InputError, match="6 points need as many"):
         displacements(fit, points, stop=np.arange(5))
+    with pytest.raises(InputError, match="stop 5 has no command"):
+        displacements(fit, points, commanded=np.linspace(0, 1, 5))
