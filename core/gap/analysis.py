@@ -16,6 +16,7 @@ from core.gap.library import candidates
 from core.gap.observations import Observations
 from core.gap.placement import place, placement_slots, with_placement
 from core.gap.problem import Problem, pose_problem
+from core.gap.scatter import joint_scatter
 from core.gap.search import Found, search
 from core.gap.sharpened import encoder_steps, sharpened
 from core.gap.sim import Sim
@@ -26,10 +27,13 @@ GEOMETRY_PRIORS = (3e-5, 1e-4)
 """How well a calibrated sim's geometry may be known, rad and m; the data choose."""
 AS_CALIBRATED, UNCALIBRATED = 1e-4, 1e-3
 """Geometry known so well is what a calibration leaves; beyond, it is itself a cause."""
+DRAWN_PRIORS = (UNCALIBRATED, 3e-3, 1e-2)
+"""How far an arm as built may be from its drawing, rad and m; the data choose."""
 STRAY = 2.5
 """Calibrated sizes rms by which geometry must stray before a sim is suspected to be as drawn."""
-FAR_LEFT, GEOMETRY_CLOSES = 3.0, 0.6
-"""That is said where causes alone leave so many times the floor, and geometry with causes at most such a part of it."""
+FAR_LEFT, GEOMETRY_CLOSES = 16.0, 0.6
+"""That is said where causes alone leave so many times the floor, and geometry with causes at most such a part of it
+(mean squares)."""
 NULL_QUANTILE, NULL_MARGIN = 0.9, 3.0
 """Of the largest evidence that noise alone makes; beyond a quantile it falls off as exp(-x)."""
 MOST_FLEXIBLE, MOST_SPENT = 4, 0.08
@@ -39,6 +43,8 @@ BENT = 0.15
 """Curvature below this share of the noise does not matter."""
 LEAST_FREEDOM = 12
 """Residuals that a fit leaves free; fewer say nothing of the noise."""
+BEYOND_STATEMENT = 6.0
+"""Times the stated variance: a statement may be off by a factor of two."""
 CHANCE, LEAST_EXCESS = 3.5, 0.2
 """Standard deviations, and logarithm of a ratio of variances, beyond which repeats scatter less than residuals."""
 
@@ -61,10 +67,19 @@ class NoiseFound:
     memory: float
     excess: float
     """Variance that is left over the noise's when everything flexible has been fitted."""
+    beyond_statement: float
+    """Variance of the noise over the stated one's."""
     outliers: np.ndarray
     """Indices of points that are left out, (k,)."""
     weight: Array
     """(m,)"""
+    scattering: int | None = None
+    """The joint, 1..n, from which most of the scatter comes; None: from none more than from others."""
+
+    @property
+    def unlike_statement(self) -> bool:
+        """Whether points scatter by far more than was stated of the instrument: something else does not repeat."""
+        return self.beyond_statement > BEYOND_STATEMENT
 
     def over(self, seen: Observations, left_m: Array) -> "NoiseFound":
         """The same noise over more points, with what a fit leaves of them, (m, 3)."""
@@ -188,11 +203,13 @@ def _first_noise(told: Doings, residual_m: Array, covariance: Array, weight: Arr
         np.isfinite(told.seen.campaign.measurements.covariance_m2[told.seen.rows]).all()
     )
     source = "statement" if stated else "residuals"
-    freedom = 0.0
+    freedom, beyond = 0.0, 1.0
     if found is not None:
         covariance, source, freedom = _rescaled(covariance, found.variance), "replicates", found.freedom
+        beyond = found.variance if stated else 1.0
     floor = np.trace(covariance, axis1=1, axis2=2)
-    return NoiseFound(covariance, floor, source, stated, freedom, np.inf, 0.0, 1.0, np.zeros(0, dtype=int), weight)
+    none = np.zeros(0, dtype=int)
+    return NoiseFound(covariance, floor, source, stated, freedom, np.inf, 0.0, 1.0, beyond, none, weight)
 
 
 def _rescaled(covariance: Array, variance: float) -> Array:
@@ -210,7 +227,7 @@ def _best_prior(problem: Problem, floor_m2: float) -> tuple[Evidence, float, flo
     calibrated = (*best, Chosen())
     if not _geometry_strays(problem):
         return calibrated
-    drawn = _with_geometry(problem)
+    drawn = _as_drawn(problem)
     # As drawn: data enough overcome any prior, and what is fitted along must not hide what is off.
     left, with_geometry = _kept_out_m2(problem, calibrated, KNOWN), _kept_out_m2(problem, drawn, AS_CALIBRATED)
     return drawn if left > FAR_LEFT * floor_m2 and with_geometry < GEOMETRY_CLOSES * left else calibrated
@@ -232,10 +249,13 @@ def _geometry_strays(problem: Problem) -> bool:
 
 
 def _kept_out_m2(problem: Problem, found: tuple[Evidence, float, float, Found, Chosen], prior: float) -> float:
-    """What a hypothesis leaves of kept-out points where geometry beside it is known to so much, m^2."""
+    """The least that a hypothesis leaves of kept-out points where geometry beside it is known to so much, m^2.
+
+    With all that was found, or less: small causes may overfit, and may also be what keeps geometry from straying.
+    """
     _, _, _, names, given = found
-    everything = joined(given, names.worth)
-    return KeptOut(problem, blocks(problem.sim.seen), prior, everything.groups).square_m2(everything)
+    kept = KeptOut(problem, blocks(problem.sim.seen), prior, joined(given, names.chosen, names.worth).groups)
+    return min(kept.square_m2(joined(given, some)) for some in (names.chosen, names.worth))
 
 
 def null_threshold(problem: Problem, evidence: Evidence) -> float:
@@ -243,7 +263,12 @@ def null_threshold(problem: Problem, evidence: Evidence) -> float:
     return float(np.quantile(evidence.null_maxima(problem.cost), NULL_QUANTILE) + NULL_MARGIN)
 
 
-def _with_geometry(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
+def _as_drawn(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
+    """The search when the sim's geometry is a drawing's, off by what makes everything together most probable."""
+    return max((_with_geometry(problem, size) for size in DRAWN_PRIORS), key=lambda one: one[3].log_evidence)
+
+
+def _with_geometry(problem: Problem, drawn: float) -> tuple[Evidence, float, float, Found, Chosen]:
     """The search when the sim's geometry is generally off: every frame and zero offset is a cause from the start."""
     evidence = problem.evidence(AS_CALIBRATED)
     threshold = null_threshold(problem, evidence)
@@ -252,7 +277,7 @@ def _with_geometry(problem: Problem) -> tuple[Evidence, float, float, Found, Cho
         k for k in problem.named if problem.candidates[k].place.effect == "geometry" or _zero_of_joint(problem, k)
     ]
     for k in members:
-        given = given.plus(int(k), UNCALIBRATED / float(problem.design.scale[problem.slices[k].start]))
+        given = given.plus(int(k), drawn / float(problem.design.scale[problem.slices[k].start]))
     found = search(evidence, problem.named, problem.cost, threshold, given)
     return evidence, AS_CALIBRATED, threshold, found, given
 
@@ -367,15 +392,19 @@ def _learned_noise(told: Doings, problem: Problem, spent: float, left: Array, fi
     if freedom < LEAST_FREEDOM:
         return first
     variance = noise_found.robust_variance(standard[used]) * 3 * np.count_nonzero(used) / freedom
-    scaled = standard / np.sqrt(max(variance, 1e-300))
-    memory = noise_found.memory(told, scaled, used)
+    covariance = _rescaled(covariance, variance)
     weight = first.weight.copy()
-    outlying = np.flatnonzero(used & (np.abs(scaled).max(axis=1) > noise_found.OUTLYING))
+    weight[_outlying(left, covariance, used)] = 0.0
+    scatter = joint_scatter(problem.sim, told, left, whitening(covariance, (weight > 0).astype(float)))
+    shaped = covariance if scatter is None else scatter.over(covariance)
+    scaled = whitening(shaped, np.ones(len(left))).rows(left)
+    memory = noise_found.memory(told, scaled, used)
+    outlying = _outlying(left, shaped, used)
+    weight = first.weight.copy()
     weight[outlying] = 0.0
     inlying = weight > 0
     tails = noise_found.tail_degrees(scaled[inlying])
     weight[inlying] *= noise_found.student_weights(scaled[inlying], tails)
-    covariance = _rescaled(covariance, variance)
     floor, source, excess = np.trace(covariance, axis1=1, axis2=2), "residuals", 1.0
     if first.stated and first.source != "replicates":
         # Nothing says that what is left beyond a stated noise is noise.
@@ -389,4 +418,14 @@ def _learned_noise(told: Doings, problem: Problem, spent: float, left: Array, fi
             floor = np.trace(_rescaled(first.covariance_m2, repeated), axis1=1, axis2=2)
         else:
             excess, freedom = 1.0, freedom + again.freedom
-    return NoiseFound(covariance, floor, source, first.stated, freedom, tails, memory, excess, outlying, weight)
+    beyond = first.beyond_statement * variance / excess if first.stated else 1.0
+    joint = None if scatter is None else scatter.joint
+    return NoiseFound(
+        shaped, floor, source, first.stated, freedom, tails, memory, excess, beyond, outlying, weight, joint
+    )
+
+
+def _outlying(left_m: Array, covariance_m2: Array, used: np.ndarray) -> np.ndarray:
+    """Indices of points that are farther off than any noise, (k,)."""
+    scaled = whitening(covariance_m2, np.ones(len(left_m))).rows(left_m)
+    return np.flatnonzero(used & (np.abs(scaled).max(axis=1) > noise_found.OUTLYING))

@@ -36,7 +36,6 @@ from core.gap.result import (
     Rivals,
     Verdict,
 )
-from core.gap.scatter import scattering_joint
 from core.gap.transfer import transfers
 from core.gap.warnings_of import warnings_of
 from core.gap.where import where
@@ -202,10 +201,10 @@ class Findings:
             unknown = Place(UNKNOWN, joint=place.joint, variable=place.variable)
             if not any(one.place.same_as(unknown) for one in out):
                 out.append(Stand(unknown, rest.groups, rest.sizes, 0.0))
-        if not out and not named and self.analysis.noise.excess > 1:
-            joint = scattering_joint(self.analysis.problem, self.left_m)
-            if joint is not None:
-                out.append(Stand(Place(UNKNOWN, joint=joint), (), (), 0.0))
+        noise = self.analysis.noise
+        told = noise.scattering in {one.place.joint for one in (*out, *named)}
+        if noise.scattering is not None and not told and (noise.excess > 1 or noise.unlike_statement):
+            out.append(Stand(Place(UNKNOWN, joint=noise.scattering), (), (), 0.0))
         return out
 
     @cached_property

@@ -26,6 +26,8 @@ LOCALLY, GLOBALLY = 0.92, 0.75
 """Shares of what nameless functions close that a name must close to stand."""
 WEAKER = 0.10
 """Of what is closed at one place: the second name there must close so much."""
+MOVES = 0.1
+"""Of what can be closed: what adds little to the evidence but closes so much is judged all the same."""
 MOST_NAMELESS = 3
 COMPLETED = frozenset({"thermal", "drift", "axis_wobble", "linkage", "payload", "compliance", "flexure", "hysteresis"})
 """Effects whose forms are rough: several of one place describe it together."""
@@ -160,7 +162,7 @@ class Judge:
 
 def stands(judge: Judge) -> list[Stand]:
     """What can be said of each place where something acts, strongest first."""
-    kept = _predicting(judge, judge.worth)
+    kept = _predicting(judge, _worthy(judge))
     out = []
     by_variable: dict[str, list[int]] = {}
     for k, group in enumerate(kept.groups):
@@ -168,6 +170,13 @@ def stands(judge: Judge) -> list[Stand]:
     for variable, members in by_variable.items():
         out += _at(judge, variable, _pick(kept, members), _elsewhere(judge, variable, kept))
     return _steps_together(out)
+
+
+def _worthy(judge: Judge) -> Chosen:
+    """What the data say much for, and what moves much: placement and geometry hide that from the evidence."""
+    whole, found = judge.square(judge.found), judge.found
+    lost = [judge.square(found.without(k)) - whole for k in range(len(found.groups))]
+    return joined(judge.worth, _pick(found, [k for k, m2 in enumerate(lost) if m2 > MOVES * judge.closable_m2]))
 
 
 def _elsewhere(judge: Judge, variable: str, kept: Chosen) -> Chosen:
