@@ -8,15 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
+from app.isolability_summary import isolability_lines
 from app.output import OutputFile, require_writable, write_files
 from app.progress import Progress
 from app.standard_output import print_result
 from core.calibration import calibrate
 from core.campaign_files import read_campaign
 from core.errors import InputError
+from core.gap.additions import Addition, additions
+from core.gap.isolability import Isolability, isolability
+from core.gap.isolability_json import isolability_record
 from core.measurements import Campaign
 from core.planning.mounts import with_bar
 from core.planning.plan_files import PLAN_FORMAT, assumptions, plan_csv, plan_json
+from core.planning.planned_campaign import planned_campaign
 from core.planning.proposal import (
     KINDS,
     Proposal,
@@ -46,7 +51,8 @@ within the middle half of all joints' ranges.
 
 Targets are seen if every --station sees them; two stations with --sigma-arcsec are theodolites, whose points are less
 exact the farther away they are. What is written: plan.csv, the commands with the columns of measurements.csv and no
-points yet, and plan.json with what to expect."""
+points yet, and plan.json with what to expect: how exact the arm will be, and which causes of a sim-to-real gap the
+points will show and tell apart."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +64,14 @@ class Given:
     ranges: np.ndarray
     """Of the motors from the marks, in which the arm is to be exact, (n, 2)."""
     seconds_a_shot: float
+
+
+@dataclass(frozen=True)
+class ToldApart:
+    """What the shots will tell of causes of a gap, and what more could."""
+
+    found: Isolability
+    tried: tuple[Addition, ...]
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -111,7 +125,7 @@ def run(arguments: argparse.Namespace) -> None:
     folder: Path = arguments.out
     require_writable(folder)
     _require_replaceable(folder)
-    with Progress(4) as progress:
+    with Progress(5) as progress:
         progress.step("reading")
         given = _given(arguments)
         progress.step("placing shots")
@@ -121,11 +135,13 @@ def run(arguments: argparse.Namespace) -> None:
         saved = None
         if given.campaign is not None:
             saved = saving(proposal, needed, given.campaign.measurements, given.seconds_a_shot)
+        progress.step("asking which causes of a gap they will tell apart")
+        told = _told_apart(proposal, given)
         progress.step("writing")
         title = given.campaign.title if given.campaign else ""
-        text = plan_json(proposal, saved, given.seconds_a_shot, title)
+        text = plan_json(proposal, saved, given.seconds_a_shot, title, isolability_record(told.found, told.tried))
         write_files(folder, (OutputFile("plan.csv", plan_csv(proposal)), OutputFile("plan.json", text)))
-    print_result(_summary(proposal, saved, given, folder), text, as_json=arguments.json)
+    print_result(_summary(proposal, saved, told, given, folder), text, as_json=arguments.json)
 
 
 def _given(arguments: argparse.Namespace) -> Given:
@@ -186,13 +202,20 @@ def _seconds_a_shot(campaign: Campaign | None) -> float:
     return usual if usual > 0 else SECONDS_A_SHOT
 
 
+def _told_apart(proposal: Proposal, given: Given) -> ToldApart:
+    """A site of a campaign is that of a calibrated arm; of a drawing neither geometry nor targets are settled."""
+    calibrated = given.campaign is not None
+    found = isolability(planned_campaign(proposal, given.seconds_a_shot, calibrated), drawn=not calibrated)
+    return ToldApart(found, additions(found))
+
+
 def _in_si(site: Site, ranges: list[tuple[int, float, float]]) -> dict[int, tuple[float, float]]:
     sliding = site.robot.sliding
     scale = {j: 1e-3 if 1 <= j <= len(sliding) and sliding[j - 1] else math.pi / 180 for j, _, _ in ranges}
     return {joint: (low * scale[joint], high * scale[joint]) for joint, low, high in ranges}
 
 
-def _summary(proposal: Proposal, saved: Saving | None, given: Given, folder: Path) -> str:
+def _summary(proposal: Proposal, saved: Saving | None, told: ToldApart, given: Given, folder: Path) -> str:
     minutes, expected = proposal.shots * given.seconds_a_shot / 60, proposal.expected
     what = f"{len(proposal.sweeps)} sweeps" if proposal.sweeps else "free poses"
     lines = [
@@ -203,6 +226,7 @@ def _summary(proposal: Proposal, saved: Saving | None, given: Given, folder: Pat
     lines += [f"  {_row(proposal, k)}" for k in range(len(proposal.sweeps))]
     if saved is not None:
         lines.append(f"  {_against(saved)}")
+    lines += isolability_lines(told.found, told.tried)
     if proposal.unobservable:
         lines.append(f"Note: {proposal.unobservable} combinations of unknowns are not shown by these shots")
     lines += [f"Note: {sentence}" for sentence in assumptions(proposal)]

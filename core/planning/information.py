@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.arm_jacobian import Prediction
 from core.geometry import Array
 from core.measurements import Measurements
 from core.planning.site import Site
@@ -45,11 +46,16 @@ class Information:
 def whitened(site: Site, commanded: Array, target: np.ndarray) -> Array:
     """Derivatives of planned sightings by all unknowns in units of their noise, A, (m, 3, p)."""
     seen = site.predict(commanded, target)
+    return np.linalg.solve(np.linalg.cholesky(expected_covariance(site, seen)), seen.jacobian)
+
+
+def expected_covariance(site: Site, seen: Prediction) -> Array:
+    """What instrument and repeatability make of planned sightings, (m, 3, 3), m^2."""
     covariance = site.sight.covariance(seen.point_m) + site.repeats.link_sigma_m**2 * np.eye(3)
-    if site.repeats.joint_sigma is not None:
-        by_joint = seen.by_net * site.repeats.joint_sigma
-        covariance = covariance + by_joint @ np.swapaxes(by_joint, 1, 2)
-    return np.linalg.solve(np.linalg.cholesky(covariance), seen.jacobian)
+    if site.repeats.joint_sigma is None:
+        return covariance
+    by_joint = seen.by_net * site.repeats.joint_sigma
+    return covariance + by_joint @ np.swapaxes(by_joint, 1, 2)
 
 
 def information_of(site: Site, table: Measurements) -> Information:

@@ -23,12 +23,19 @@ def plan_csv(proposal: Proposal) -> str:
     return measurements_csv(Campaign(site.robot, site.targets, proposal.rows, home=site.home))
 
 
-def plan_json(proposal: Proposal, saved: Saving | None, seconds_a_shot: float, source: str = "") -> str:
+def plan_json(
+    proposal: Proposal,
+    saved: Saving | None,
+    seconds_a_shot: float,
+    source: str = "",
+    isolability: Json | None = None,
+) -> str:
     """The text of plan.json.
 
     Args:
         saved: against the shots of a campaign; None: there are none to compare with.
         source: title of that campaign.
+        isolability: which causes of a gap the shots will be able to tell apart; None: nobody asked.
     """
     site = proposal.site
     return json_text(
@@ -52,6 +59,7 @@ def plan_json(proposal: Proposal, saved: Saving | None, seconds_a_shot: float, s
             "noise": _noise(proposal),
             "targets": _targets(proposal),
             "sweeps": [_sweep(site.robot, sweep) for sweep in proposal.sweeps],
+            "isolability": isolability,
             "assumptions": list(assumptions(proposal)),
         }
     )

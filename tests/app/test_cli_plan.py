@@ -55,6 +55,42 @@ def test_it_writes_the_commands_and_what_to_expect(planned: tuple[str, Path]) ->
     assert any("collisions" in sentence for sentence in document["assumptions"])
 
 
+def test_it_says_which_causes_of_a_gap_the_points_will_tell_apart(planned: tuple[str, Path]) -> None:
+    kind, out = planned
+    found = plan_of(out)["isolability"]
+    by_text = {one["text"]: one for one in found["effects"]}
+    assert len(by_text) == len(found["effects"]) > 70
+    ratio = by_text["gear ratio of joint 4"]
+    assert ratio["seen"]
+    assert 0.05 < ratio["limit_rms_mm"] < 1.0
+    assert ratio["unit"] == "ppm"
+    hidden = by_text["zero offset of joint 1"]
+    assert (hidden["seen"], hidden["told_apart"], hidden["limit_rms_mm"]) == (False, False, None)
+    for one in found["effects"]:
+        assert one["told_apart"] == (one["seen"] and not one["could_be_taken_for"])
+        assert all(rival["separation_std"] < found["apart_std"] for rival in one["could_be_taken_for"])
+        assert one["add"] is None or not one["told_apart"]
+    lost_motion = any("lost motion" in sentence for sentence in found["not_tested"])
+    assert lost_motion == (kind == "poses")
+    assert ("backlash of joint 3" in by_text) == (kind == "sweeps")
+    pairs = [one["pairs_told_apart"] + one["effects_brought_to_light"] for one in found["additions"]]
+    assert pairs == sorted(pairs, reverse=True)
+
+
+def test_the_summary_has_a_table_of_limits_effect_by_joint(tmp_path: Path) -> None:
+    done = trueaxis("plan", CAMPAIGN, "--shots", 70, "--out", tmp_path)
+    assert done.returncode == 0
+    lines = done.stdout.splitlines()
+    start = next(k for k, line in enumerate(lines) if "able to tell apart" in line)
+    assert lines[start + 2].split() == ["1", "2", "3", "4", "5", "6", "rest"]
+    (ratio,) = [line for line in lines if line.startswith("  gear ratio")]
+    assert len(ratio.split()) == 2 + 6
+    counts = next(line for line in lines if "would be named" in line)
+    total, named, confused, hidden = (int(word) for word in counts.replace(",", "").split() if word.isdigit())
+    assert total == named + confused + hidden
+    assert any(line.startswith("  add ") for line in lines)
+
+
 def test_commands_are_within_the_limits_of_the_robot(planned: tuple[str, Path]) -> None:
     _, out = planned
     limits = np.rad2deg([joint.limits for joint in read_robot(CAMPAIGN / "robot.toml").joints])
@@ -113,6 +149,7 @@ def test_a_robot_alone_can_be_planned_for(tmp_path: Path) -> None:
     document = plan_of(tmp_path)
     assert document["saving"] is None
     assert [target["link"] for target in document["targets"]]
+    assert "as drawn" in document["isolability"]["geometry"]
     assert any("from_to_mm" in sweep for sweep in document["sweeps"])
 
 
