@@ -11,6 +11,7 @@ from core.robot import Robot
 from core.session_library import SessionSummary
 from core.session_state import State
 from core.suggested_plan import unseen_joints
+from core.wording import fixed
 
 SOURCES = {
     Source.DEMO: "the built-in demo cell: a <b>simulated</b> robot and instrument",
@@ -41,12 +42,12 @@ def about_words(bench: Workbench) -> str:
         ("Instrument", state.instrument.kind.replace("-", " ")),
         ("Stated noise", _noise(state)),
         ("Operator", state.operator or "not named yet"),
-        *((key, value) for key, value in state.facts.items()),
+        *((key[:1].upper() + key[1:], value) for key, value in state.facts.items()),
         *((_condition(key), f"{value:g}") for key, value in state.settings.items() if key in CONDITIONS),
         *((f"Target {t.name}", _place(t.link)) for t in state.targets),
         ("Session file", bench.session.path.name),
     )
-    body = "".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in rows)
+    body = "".join(f"<tr><td class='name'>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in rows)
     return block(f"<table>{body}</table>", "cell")
 
 
@@ -71,7 +72,10 @@ def targets_words(state: State) -> str:
 def tray_words(tray: Tray, robot: Robot | None, wrong: str) -> str:
     """The files that were sent, what they make, and what is missing."""
     if not tray.files:
-        text = "robot.toml or a URDF file of your robot; or a campaign: its ZIP file, or its three files one by one."
+        text = (
+            "robot.toml or a URDF file of your robot; a campaign as a ZIP file, or its three files one by one; or a "
+            "session file."
+        )
         return block(f"<p class='soft'>{text}</p>", "tray")
     names = ", ".join(map(escape, tray.names))
     words = f"<p>Files here: {names}.</p>"
@@ -98,7 +102,7 @@ def sessions_words(summaries: tuple[SessionSummary, ...], chosen: str, most: int
 
 def _session_row(one: SessionSummary, chosen: bool) -> str:
     who = ", ".join(escape(word) for word in (one.robot, one.operator) if word)
-    told = f"{escape(one.title)}<br><span class='soft'>{who}</span>"
+    told = f"{escape(one.title)}<br><span class='soft'>{escape(one.path.name)}<br>{who}</span>"
     told += f"<br><span class='bad'>{escape(one.problem[:160])}</span>" if one.problem else ""
     return (
         f"<tr class='{'now' if chosen else ''}'><td>{told}</td>"
@@ -116,7 +120,7 @@ def _place(link: int) -> str:
 
 
 def _known(point_m: tuple[float, float, float] | None) -> str:
-    return "" if point_m is None else ", ".join(f"{v * 1e3:.1f}" for v in point_m) + " mm"
+    return "" if point_m is None else ", ".join(fixed(v * 1e3, 1) for v in point_m) + " mm"
 
 
 def _noise(state: State) -> str:

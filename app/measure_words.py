@@ -6,12 +6,13 @@ from html import escape
 import numpy as np
 
 from app.clicks import listening, saying
+from app.event_words import event_words
 from app.glossary import term
 from app.sweep_progress import SweepProgress
 from app.words import block
 from core.live_sweep import Verdict
 from core.robot import Robot
-from core.session_events import Event, Judged, Planned, PosesPlanned, Setting, ShotTaken, Skipped
+from core.session_events import Event
 from core.session_live import Expected, SweepSoFar
 from core.session_plan import PlannedSweep, Step
 from core.session_state import Shot, State
@@ -78,7 +79,7 @@ def step_words(state: State, robot: Robot, by_hand: bool, expected: Expected | N
 def sweeps_table(rows: tuple[SweepProgress, ...], robot: Robot) -> str:
     """Table 1 as a living table; a click on a row goes on there."""
     if not rows:
-        text = "No sweep is planned. Open <b>1 Cell</b>, <b>Sweeps</b>, and press <b>Suggest</b>."
+        text = "No sweep is planned. Open <b>1 Cell</b>, <b>Sweeps</b>, and press <b>Suggest all</b>."
         return block(f"<p class='soft'>{text}</p>", "sweeps")
     body = "".join(_table_row(row, robot) for row in rows)
     several = any(row.planned.sweep > 1 for row in rows)
@@ -133,7 +134,7 @@ def undo_words(event: Event | None, state: State) -> str:
     """What an undo would take back."""
     if event is None:
         return block("<p class='soft'>Nothing to undo.</p>", "undo")
-    return block(f"<p class='soft'>Undo takes back: {escape(_event(event, state))}.</p>", "undo")
+    return block(f"<p class='soft'>Undo takes back: {escape(event_words(event, state))}.</p>", "undo")
 
 
 def shot_words(shot: Shot | None, chosen: bool) -> str:
@@ -141,7 +142,7 @@ def shot_words(shot: Shot | None, chosen: bool) -> str:
     if shot is None:
         return block("<p class='soft'>Nothing is measured yet.</p>", "shot")
     taken = shot.taken
-    point = "not seen" if taken.point_m is None else ", ".join(f"{v * 1e3:.2f}" for v in taken.point_m) + " mm"
+    point = "not seen" if taken.point_m is None else ", ".join(fixed(v * 1e3, 2) for v in taken.point_m) + " mm"
     reason = f" ({escape(shot.reason)})" if shot.reason else ""
     fate = "measured again since" if shot.superseded_by is not None else escape(shot.verdict)
     which = "chosen" if chosen else "the last one; click a point in 3-D to choose another"
@@ -178,7 +179,7 @@ def entered_words(text: str, error: str | None, count: int) -> str:
 
 def _nothing_left(state: State) -> str:
     if not state.plan.sweeps:
-        text = "No sweep is planned. Open <b>1 Cell</b>, <b>Sweeps</b>, and press <b>Suggest</b>."
+        text = "No sweep is planned. Open <b>1 Cell</b>, <b>Sweeps</b>, and press <b>Suggest all</b>."
         return f"<h3>Nothing is planned yet</h3><p>{text}</p>"
     if not state.steps:
         text = "The plan does not fit robot and targets any more: plan the sweeps again under <b>1 Cell</b>."
@@ -204,7 +205,7 @@ def _expected(expected: Expected | None, aims: Sequence[str]) -> str:
     if expected is None:
         return "<p class='soft'>The target was not seen before: aim by eye.</p>"
     place = ", ".join(fixed(v * 1e3, 0 if not expected.by_sweep else 1) for v in expected.point_m)
-    source = "by this sweep so far" if expected.by_sweep else "by the nominal arm, so only about"
+    source = "by this sweep so far" if expected.by_sweep else "about, by the nominal arm"
     aimed = "".join(f"<br>{escape(aim)}" for aim in aims)
     name = term("Expected", "Expected place")
     return f"<p>{name} at <b data-testid='expected'>{place} mm</b> <span class='soft'>({source})</span>{aimed}</p>"
@@ -235,7 +236,8 @@ def _next(state: State, step: Step, by_hand: bool) -> str:
 
 
 def _commands(robot: Robot, step: Step) -> str:
-    return ", ".join(f"q{k + 1} = {_value(robot, k, value)}" for k, value in enumerate(step.commanded))
+    values = (f"q{k + 1} = {_value(robot, k, value)}" for k, value in enumerate(step.commanded))
+    return ", ".join(f"<span class='value'>{value}</span>" for value in values)
 
 
 def _plain(robot: Robot, step: Step) -> str:
@@ -252,27 +254,33 @@ def _value(robot: Robot, k: int, value: float) -> str:
 
 def _table_row(row: SweepProgress, robot: Robot) -> str:
     planned = row.planned
-    unit, scale = ("mm", 1e3) if robot.joints[planned.joint - 1].slides else ("°", 180 / np.pi)
+    unit, scale = (" mm", 1e3) if robot.joints[planned.joint - 1].slides else ("°", 180 / np.pi)
     span = (planned.high - planned.low) * scale
     step = span / (planned.stops - 1)
     name = f"{planned.joint}" if planned.sweep == 1 else f"{planned.joint}.{planned.sweep}"
     word = f"{SWEEP_WORD}{planned.joint}-{planned.sweep}"
     both = " ⇄" if planned.both_ways else ""
+    beside = _beside(row)
+    notes = f"<tr class='more'><td></td><td class='soft' colspan='7'>{beside}</td></tr>" if beside else ""
+    look = " ".join(["now"] * row.current + ["led"] * bool(beside))
     return (
-        f"<tr class='{'now' if row.current else ''}' {saying(word, 'Go on with this sweep')}><td>{name}{both}</td>"
+        f"<tr class='{look}' {saying(word, 'Go on with this sweep')}><td class='key'>{name}{both}</td>"
         f"<td class='n'>{span:.0f}{unit}</td><td class='n'>{step:.1f}{unit}</td><td class='n'>{planned.stops}</td>"
         f"<td>{escape(', '.join(planned.targets))}</td><td class='n'>{row.done}</td><td class='n'>{row.left}</td>"
-        f"<td>{_state_of(row)}</td></tr>"
+        f"<td class='key'>{_state_of(row)}</td></tr>{notes}"
     )
 
 
 def _state_of(row: SweepProgress) -> str:
-    notes = [f"{count} {word}" for count, word in ((row.skipped, "skipped"), (row.extra, "extra")) if count]
-    notes += [f"{row.excluded} out"] if row.excluded else []
-    more = f"<br><span class='soft'>{', '.join(notes)}</span>" if notes else ""
     if row.finished:
-        return f"<span class='ok'>✔ done</span>{more}"
-    return ("<b>▶ now</b>" if row.current else "<span class='soft'>to do</span>") + more
+        return "<span class='ok'>✔ done</span>"
+    return "<b>▶ now</b>" if row.current else "<span class='soft'>to do</span>"
+
+
+def _beside(row: SweepProgress) -> str:
+    """What of a sweep is not as planned."""
+    counts = (row.skipped, "skipped"), (row.extra, "extra"), (row.excluded, "excluded")
+    return ", ".join(f"{count} {word}" for count, word in counts if count)
 
 
 def _not_defined(so_far: SweepSoFar, slides: bool) -> str:
@@ -310,23 +318,6 @@ def _if_you_stop(so_far: SweepSoFar, tool_std_m: float | None) -> str:
     if tool_std_m is not None:
         where = f"position to <b>{_std(tool_std_m * 1e3)} mm</b> at the tool"
     return f"<p>If you stop now: {direction}, {where}.</p>"
-
-
-def _event(event: Event, state: State) -> str:
-    if isinstance(event, ShotTaken):
-        again = "the second measurement of " if event.replaces else ""
-        return f"{again}the shot of joint {event.joint}, stop {event.step + 1}, target {event.target}"
-    if isinstance(event, Judged):
-        shot = state.shot(event.shots[0])
-        record = "shots" if shot is None or len(event.shots) > 1 else f"record {shot.record}"
-        return f"that {record} is {event.verdict}"
-    if isinstance(event, Skipped):
-        return f"the skipping of joint {event.joint}, stop {event.step + 1}, target {event.target}"
-    if isinstance(event, Setting):
-        return f"the choice of {event.key.replace('_', ' ')}"
-    if isinstance(event, Planned | PosesPlanned):
-        return "the change of the plan"
-    return f"what was entered last ({type(event).__name__})"
 
 
 def _signed(value: float) -> str:

@@ -31,6 +31,14 @@ def guard_uploads(server: "viser.ViserServer", may: Callable[[int], bool], refus
     """
     from viser import _messages
 
+    def turn_away(client_id: int, message: _messages.FileTransferStartUpload | _messages.FileTransferPart) -> None:
+        """Let a browser's button be pressed again and take its notice of a file on its way from the page."""
+        client = server.get_clients().get(client_id)
+        if client is not None:
+            send, uuid = client.gui._websock_interface.queue_message, message.transfer_uuid
+            send(_messages.FileTransferPartAck(message.source_component_uuid, uuid, 1, 1))
+            send(_messages.RemoveNotificationMessage(f"upload-{uuid}"))
+
     gui, wire = server.gui, server._websock_server
     start, part = gui._handle_file_transfer_start, gui._handle_file_transfer_part
     wire.unregister_handler(_messages.FileTransferStartUpload, start)
@@ -39,6 +47,7 @@ def guard_uploads(server: "viser.ViserServer", may: Callable[[int], bool], refus
     def checked_start(client_id: int, message: _messages.FileTransferStartUpload) -> None:
         why = _why_not(message.size_bytes, len(gui._current_file_upload_states), may(client_id))
         if why:
+            turn_away(client_id, message)
             refuse(client_id, why)
         else:
             start(client_id, message)
@@ -49,6 +58,7 @@ def guard_uploads(server: "viser.ViserServer", may: Callable[[int], bool], refus
             return
         if state["client_id"] != client_id or state["transferred_bytes"] + len(message.content) > state["total_bytes"]:
             gui._current_file_upload_states.pop(message.transfer_uuid, None)
+            turn_away(client_id, message)
             refuse(client_id, "The file that came is not the one that was announced; send it again.")
             return
         part(client_id, message)

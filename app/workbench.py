@@ -93,6 +93,7 @@ class Workbench:
 
     def switch(self, session: Session) -> None:
         """Work on another session; the one at hand is closed."""
+        self.runs.stop()
         self._work.exchange(session)
         self.solving.forget()
         self._work.changed()

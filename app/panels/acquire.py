@@ -18,14 +18,15 @@ from app.measure_words import (
 from app.panels.extra_stop import ExtraStop
 from app.panels.typed_points import TypedPoints
 from app.sweep_progress import sweep_progress
+from app.words import BIG
 from app.workbench import Workbench
 from core.errors import InputError
 
 if TYPE_CHECKING:
     from core.session_state import Shot
 
-REASONS = ("target was bumped", "wrong target", "robot had not settled", "sight was blocked", "in my own words")
-OWN_WORDS = REASONS[-1]
+UNSAID, OWN_WORDS = "choose a reason", "in my own words"
+REASONS = (UNSAID, "target was bumped", "wrong target", "robot had not settled", "sight was blocked", OWN_WORDS)
 RUNNING = "The robot is running: press Pause (P) or Stop (Esc) first."
 
 
@@ -38,6 +39,7 @@ class AcquirePanel:
         self._began, self._done, self._total = 0.0, 0, 0
         self._step = gui.add_html("")
         self._typed = TypedPoints(gui, bench)
+        gui.add_html(BIG)
         gui.add_button("Measure", color="green", icon=viser.Icon.CROSSHAIR, hint="Space or Enter").on_click(
             self.measure
         )
@@ -110,7 +112,12 @@ class AcquirePanel:
     def skip(self, event: object) -> None:
         """Leave out the next shot."""
         reason = self._said()
-        self._ask_at_rest(event, lambda: self._bench.decisions.skip(reason))
+
+        def job() -> None:
+            self._bench.decisions.skip(reason)
+            self._unsay()
+
+        self._ask_at_rest(event, job)
 
     def measure_again(self, event: object) -> None:
         """Measure the chosen shot, or the last one, again."""
@@ -176,7 +183,7 @@ class AcquirePanel:
         if asked == "Measure again":
             self.measure_again(event)
         elif asked == "Exclude":
-            self._ask_at_rest(event, lambda: self._bench.decisions.exclude(number, reason))
+            self._ask_at_rest(event, lambda: self._exclude(number, reason))
         else:
             self._ask_at_rest(event, lambda: self._bench.decisions.include(number))
 
@@ -191,11 +198,21 @@ class AcquirePanel:
         """Do something at once that must not wait for what is in progress."""
         self._ask(event, lambda client: act(), at_once=True)
 
+    def _exclude(self, number: int, reason: str) -> None:
+        if not reason:
+            raise InputError("a shot is left out for a reason: choose one below, or write your own, then press Exclude")
+        self._bench.decisions.exclude(number, reason)
+        self._unsay()
+
+    def _unsay(self) -> None:
+        """The next decision has its own reason."""
+        self._reason.value, self._words.value = UNSAID, ""
+
     def _said(self) -> str:
         """The reason, as it is to be kept; what a browser sends is not to be trusted."""
         if self._reason.value == OWN_WORDS:
             return " ".join(str(self._words.value).split())[:200]
-        return self._reason.value if self._reason.value in REASONS else ""
+        return self._reason.value if self._reason.value in REASONS[1:] else ""
 
     def _number(self) -> int | None:
         if self._chosen is not None:

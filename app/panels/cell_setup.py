@@ -122,7 +122,7 @@ class SweepEntry:
 
     def __init__(self, gui: "viser.GuiApi", bench: Workbench, ask: Callable) -> None:
         self._bench, self._ask = bench, ask
-        self._offered: tuple[str, ...] = ()
+        self._offered: tuple[PlannedSweep, ...] = ()
         text = (
             "One joint moves at a time, the last joint first. Longer arcs and more stops make axes better known. "
             "<b>Suggest all</b> plans a sweep of every joint that a target shows."
@@ -146,13 +146,16 @@ class SweepEntry:
         gui.add_button("Keep home").on_click(self._keep_home)
 
     def refresh(self) -> None:
-        """Offer the sweeps of the plan."""
-        names = (*(_name(row) for row in self._bench.state.plan.sweeps), NEW)
-        if names != self._offered:
-            self._offered = names
+        """Offer the sweeps of the plan; what is typed stays until the plan is another one."""
+        rows = self._bench.state.plan.sweeps
+        if rows == self._offered:
+            return
+        names, chosen = (*map(_name, rows), NEW), self._which.value
+        self._offered = rows
+        if names != tuple(self._which.options):
             self._which.options = names
-            self._which.value = names[0]
-            self._fill()
+            self._which.value = chosen if chosen in names[:-1] else names[0]
+        self._fill()
 
     def _fill(self) -> None:
         """The boxes as the chosen sweep has them."""

@@ -80,7 +80,10 @@ class CheckPanel:
         except InputError as wrong:
             self._echo.content = entered_words("", str(wrong), 0)
             return
-        text = f"<p class='ok'>✔ understood as {len(points)} shots. Press <b>Check</b>.</p>" if points else ""
+        if points:
+            text = f"<p class='ok'>✔ understood as {len(points)} shots. Press <b>Check</b>.</p>"
+        else:
+            text = f"<p class='soft'>One line a shot: x y z. {SHOTS} shots or more tell enough.</p>"
         self._echo.content = block(text, "check-entered")
 
 
@@ -105,7 +108,10 @@ def one_check_words(check: "Check", promised_sigma_m: float | None) -> str:
     name = term("net radial scatter", "Net radial repeatability")
     seen = f"<p>{len(check.shots)} shots at {escape(check.target)}: {name} <b>{scatter * 1e3:.3f} mm</b>"
     if promised_sigma_m is None:
-        return f"{seen}; the instrument promises nothing to compare it with.</p>"
+        return (
+            f"{seen}; the instrument promises nothing to compare it with. State its σ under "
+            "<b>1 Cell</b>, <b>Instrument and points</b>.</p>"
+        )
     promise = promised_sigma_m * 3**0.5
     seen += f", promised {promise * 1e3:.3f} mm.</p>"
     # A standard deviation of n points in space knows itself to 1 / sqrt(6 (n - 1)).

@@ -34,7 +34,7 @@ class NewSession:
         self._bench, self._ask = bench, ask
         self._tray = Tray()
         hint = "robot.toml, a URDF, campaign.toml, measurements.csv, a campaign as .zip, or a session as .trueaxis."
-        self._upload = gui.add_upload_button("Files of a robot or campaign", icon=viser.Icon.UPLOAD, hint=hint)
+        self._upload = gui.add_upload_button("Files of a robot, campaign or session", icon=viser.Icon.UPLOAD, hint=hint)
         self._upload.on_upload(self._send)
         self._words = gui.add_html("")
         self._base = gui.add_dropdown("Base link", ("-",), visible=False, hint="Where the arm stands on the floor.")
@@ -44,7 +44,8 @@ class NewSession:
         self._open = gui.add_button("Open the campaign", visible=False)
         self._open.on_click(self._open_campaign)
         self._robot = gui.add_dropdown("Robot", (*DEMOS, SAME, FILES))
-        self._points = gui.add_dropdown("Points are", (BY_HAND, SIMULATED), hint="Of the demo cells: simulated.")
+        self._robot.on_update(lambda _: self._show_points())
+        self._points = gui.add_dropdown("Points are", (BY_HAND, SIMULATED), visible=False)
         self._title = gui.add_text("Title", "", hint="Nothing: the robot's name.")
         gui.add_button("Begin", icon=viser.Icon.PLUS, hint="This session stays in the list.").on_click(self._begin)
         self._show()
@@ -78,6 +79,7 @@ class NewSession:
             box.value = (links or ("-",))[0]
         self._open.visible = self._tray.campaign is not None and not self._tray.missing()
         self._robot.value = FILES
+        self._show_points()
         self._show()
 
     def _show(self) -> None:
@@ -88,6 +90,10 @@ class NewSession:
             except InputError as refused:
                 wrong = str(refused)
         self._words.content = tray_words(self._tray, robot, wrong)
+
+    def _show_points(self) -> None:
+        """The other cells have their points from where they always had them."""
+        self._points.visible = self._robot.value == FILES
 
     def _robot_of_files(self) -> Robot:
         return self._tray.robot(_link(self._base), _link(self._tip))

@@ -38,10 +38,10 @@ class PlotBox:
         self._plot.visible = True
         self._say(f"<p class='soft'>{escape(caption)}</p>" if caption else "")
 
-    def clear(self) -> None:
-        """Back to the sentence that says what to do."""
+    def clear(self, instead: str = "") -> None:
+        """Back to the sentence that says what to do, or to another one."""
         self._plot.visible = False
-        self._say(f"<p class='soft'>{escape(self._empty)}</p>")
+        self._say(f"<p class='soft'>{escape(instead or self._empty)}</p>")
 
     def show_dark(self, dark: bool) -> None:
         """Draw for a dark or a light page."""

@@ -127,6 +127,9 @@ class ResultsPanel:
             return
         joint = last.taken.joint
         so_far = self._bench.known.so_far(joint, last.taken.sweep)
+        if so_far.live.fit is None:
+            self._live.clear(f"Residuals appear here once the axis of joint {joint} is known: see 2 Measure.")
+            return
         command = np.array([s.taken.commanded[joint - 1] for s in so_far.shots])
         sliding = bool(self._bench.nominal.sliding[joint - 1])
         self._live.show(live_figure(so_far.live, command, joint, sliding, WIDTH_PX), so_far.live.waiting_for)

@@ -13,7 +13,8 @@ from app.workbench import Workbench
 from core.errors import InputError
 from core.session import Session
 from core.session_archive import campaign_archive
-from core.session_library import SessionSummary, Shelf, copy_session, free_path
+from core.session_library import SessionSummary, Shelf, copy_session, free_path, summary_of
+from core.session_state import State
 from core.session_store import SUFFIX
 
 NONE = "-"
@@ -25,6 +26,7 @@ class SessionShelf:
     def __init__(self, gui: viser.GuiApi, bench: Workbench, ask: Callable) -> None:
         self._bench, self._ask = bench, ask
         self._listed: object = None
+        self._summaries: tuple[SessionSummary, ...] = ()
         self._shelf = Shelf(bench.session.path.parent)
         text = "Every session is one file in one folder; nothing in it is ever deleted."
         gui.add_html(block(f"<p class='soft'>{text}</p>", "sessions-intro"))
@@ -40,8 +42,13 @@ class SessionShelf:
         gui.add_button("Campaign folder (ZIP)", icon=viser.Icon.DOWNLOAD, hint=hint).on_click(self._send_campaign)
 
     def refresh(self) -> None:
-        """List the folder anew when another session is open; else only on demand, for reading files takes time."""
-        if self._bench.session is not self._listed:
+        """List the folder anew when another session is open; else only the open one, for reading files takes time."""
+        if self._bench.session is self._listed:
+            path = self._bench.session.path
+            own = summary_of(path, self._bench.state)
+            self._summaries = tuple(own if one.path == path else one for one in self._summaries)
+            self._table.content = sessions_words(self._summaries, path.name)
+        else:
             self._listed = self._bench.session
             self._shelf = Shelf(self._bench.session.path.parent)
             self._list()
@@ -50,11 +57,11 @@ class SessionShelf:
                 self._chosen.value = own
 
     def _list(self) -> None:
-        summaries = self._found(str(self._words.value)[:200])
-        names = tuple(one.path.name for one in summaries) or (NONE,)
+        self._summaries = self._found(str(self._words.value)[:200])
+        names = tuple(one.path.name for one in self._summaries) or (NONE,)
         if names != tuple(self._chosen.options):
             self._chosen.options = names
-        self._table.content = sessions_words(summaries, self._bench.session.path.name)
+        self._table.content = sessions_words(self._summaries, self._bench.session.path.name)
 
     def _found(self, words: str) -> tuple[SessionSummary, ...]:
         return self._shelf.summaries(words, (self._bench.session.path, self._bench.state))
@@ -72,6 +79,12 @@ class SessionShelf:
             self._list()
 
         self._ask(event, job)
+
+    def _state_of(self, path: Path) -> State:
+        if path == self._bench.session.path:
+            return self._bench.state
+        with Session.open(path, read_only=True) as session:
+            return session.state
 
     def _path(self, name: str) -> Path:
         """The session of the folder that has this name; whatever else a browser may send is refused."""
@@ -96,9 +109,12 @@ class SessionShelf:
         self._ask(event, job, operator=False)
 
     def _send_campaign(self, event: viser.GuiEvent) -> None:
+        chosen = self._chosen.value
+
         def job(client: viser.ClientHandle | None) -> None:
-            name = self._bench.session.path.name.removesuffix(SUFFIX)
-            data = campaign_archive(self._bench.state, name)
+            path = self._path(chosen)
+            name = path.name.removesuffix(SUFFIX)
+            data = campaign_archive(self._state_of(path), name)
             if client is not None:
                 client.send_file_download(stamped(f"{name}_campaign", "zip"), data, save_immediately=True)
 

@@ -165,7 +165,9 @@ def test_files_that_are_too_large_or_not_as_announced_are_not_taken(path, monkey
     with running(path, monkeypatch) as (dashboard, _):
         gui, wire = dashboard.server.gui, Wire()
         refused: list[str] = []
-        server = SimpleNamespace(gui=gui, _websock_server=wire)
+        told: list[object] = []
+        browser = SimpleNamespace(gui=SimpleNamespace(_websock_interface=SimpleNamespace(queue_message=told.append)))
+        server = SimpleNamespace(gui=gui, _websock_server=wire, get_clients=lambda: {1: browser})
         guard_uploads(server, lambda client: client == 1, lambda client, why: refused.append(why))
         start = wire.handlers[_messages.FileTransferStartUpload]
         part = wire.handlers[_messages.FileTransferPart]
@@ -175,6 +177,10 @@ def test_files_that_are_too_large_or_not_as_announced_are_not_taken(path, monkey
             start(client, _messages.FileTransferStartUpload(button, f"u{number}", "a.csv", "text/csv", 3, size))
 
         announced(1, LARGEST_BYTES + 1)
+        # The browser's button is free again and its notice is gone.
+        done, gone = told
+        assert (done.transfer_uuid, done.transferred_bytes) == ("u1", done.total_bytes)
+        assert gone == _messages.RemoveNotificationMessage("upload-u1")
         announced(2, -5)
         announced(3, 10, client=2)
         assert [("MB" in why, "seat" in why) for why in refused] == [(True, False), (True, False), (False, True)]

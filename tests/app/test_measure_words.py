@@ -11,7 +11,7 @@ from app.rigs import SETTING
 from app.sweep_progress import sweep_progress
 from app.workbench import Workbench
 from core.session import Session
-from core.session_events import Planned, PosesPlanned, Setting, TargetEntry, TargetsNamed
+from core.session_events import Fact, OperatorNamed, Planned, PosesPlanned, Setting, TargetEntry, TargetsNamed
 from core.session_plan import PlannedSweep
 from core.session_state import State
 from core.session_store import SUFFIX
@@ -45,7 +45,7 @@ def test_a_step_says_command_place_reason_and_what_comes_next(bench):
     text = step_of(bench)
     assert "Joint 6: stop 1 of 17, target T1" in text
     assert "q6 = -23.4039°" in text
-    assert "by the nominal arm, so only about" in text
+    assert "about, by the nominal arm" in text
     assert re.search(r"left: hz \d+\.\d{3}°, v \d+\.\d{3}°", text)
     assert "Only joint 6 moves" in text
     assert "Next: stop 2." in text
@@ -103,7 +103,7 @@ def test_the_table_counts_and_can_be_clicked(bench):
     html = sweeps_table(sweep_progress(bench.state), bench.nominal)
     assert html.count("data-say=") == 6
     assert "data-say='sweep-6-1'" in html
-    assert "1 skipped, 1 extra, 1 out" in plain(html)
+    assert "1 skipped, 1 extra, 1 excluded" in plain(html)
     assert "50°" in html
     assert "3.1°" in html
     assert "No sweep is planned" in sweeps_table((), bench.nominal)
@@ -112,7 +112,7 @@ def test_the_table_counts_and_can_be_clicked(bench):
 def test_sliding_joints_are_told_in_millimetres(tmp_path):
     with Session.create(tmp_path / f"s{SUFFIX}", demo_events(scara.cell())) as session:
         bench = Workbench(session)
-        assert "220mm" in sweeps_table(sweep_progress(bench.state), bench.nominal)
+        assert "220 mm" in sweeps_table(sweep_progress(bench.state), bench.nominal)
         bench.decisions.go_to(3, 1)
         assert "q3 = -110.000 mm" in step_of(bench)
         for _ in range(3):
@@ -160,6 +160,12 @@ def test_undo_says_what_it_takes_back(bench):
     assert "the skipping of joint 6, stop 2" in undo_words(bench.decisions.undo_event(), bench.state)
     bench.session.append(Setting("transmission_6", "direct"))
     assert "the choice of transmission 6" in undo_words(bench.decisions.undo_event(), bench.state)
+    bench.shooting.check_instrument("T1", 2)
+    assert "one shot of the instrument check at target T1" in undo_words(bench.decisions.undo_event(), bench.state)
+    bench.session.append(Fact("Place", "<b>hall</b>"))
+    assert "what was entered as Place" in undo_words(bench.decisions.undo_event(), bench.state)
+    bench.session.append(OperatorNamed("B. Somebody"))
+    assert "the operator's name" in plain(undo_words(bench.decisions.undo_event(), bench.state)).replace("&#x27;", "'")
 
 
 def test_a_run_tells_how_far_it_is(bench):

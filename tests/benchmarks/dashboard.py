@@ -154,6 +154,9 @@ def solved(page, count: int, after_ms: int) -> list[float]:
     for k in range(count):
         tab(page, "2 Measure")
         wanted, words = ("Include", "kept") if k % 2 else ("Exclude", "excluded")
+        if wanted == "Exclude":
+            page.get_by_role("combobox", name="Reason", exact=True).filter(visible=True).click()
+            page.get_by_role("option", name="wrong target", exact=True).click()
         page.get_by_text(wanted, exact=True).click()
         page.wait_for_function("words => watch.text('shot').includes(words)", arg=words)
         page.get_by_role("tab", name="3 Solve").click()

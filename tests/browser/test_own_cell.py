@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_dashboard import chromium, group, measure, press, started, tab, visit, wait_for_text  # noqa: F401
+from test_dashboard import choose, chromium, group, measure, press, started, tab, visit, wait_for_text  # noqa: F401
 
 from app.rigs import Source
 from core.calibration import calibrate
@@ -67,11 +67,6 @@ def begin(page, points: str | None = None) -> None:
     if points is not None:
         choose(page, "Points are", points)
     press(page, "Begin")
-
-
-def choose(page, label: str, option: str) -> None:
-    page.get_by_label(label, exact=True).filter(visible=True).last.click()
-    page.get_by_role("option", name=option, exact=True).click()
 
 
 def text_box(page, label: str):
