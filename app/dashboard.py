@@ -137,6 +137,7 @@ class Dashboard:
                 self._look_again()
             return
         self.verify.stop()
+        self.gap.stop()
         with self.server.atomic():
             self.server.gui.reset()
             self.server.scene.reset()
@@ -164,6 +165,7 @@ class Dashboard:
         """Close server, worker and session."""
         self.bench.runs.stop()
         self.verify.stop()
+        self.gap.stop()
         self.seat.close()
         self.jobs.close()
         with contextlib.redirect_stdout(io.StringIO()):

@@ -1,8 +1,12 @@
-"""The diagnosis on the workbench: the session's points, or a campaign that somebody uploads. Nothing here draws."""
+"""The diagnosis on the workbench: the session's points, or a campaign that somebody uploads. Nothing here draws.
+
+It takes seconds, and so runs in a process of its own: measuring and solving go on meanwhile.
+"""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
+from app.beside import Beside, Tell
 from app.pose_bench import PoseBench
 from app.workbench import Workbench
 from core.calibrated_arm import CalibratedArm
@@ -16,6 +20,8 @@ from core.session_campaign import to_campaign
 LEAST_POINTS = 24
 """Seen points on moving links from which on a diagnosis may have something to say."""
 Progress = Callable[[float, str], None]
+Finished = Callable[[str], None]
+"""Told at the end, from another thread: an empty text, or why there is no diagnosis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +41,12 @@ class GapBench:
     def __init__(self, bench: Workbench) -> None:
         self._bench, self._poses = bench, PoseBench(bench)
         self._found: tuple[Session, Diagnosed] | None = None
+        self._work = Beside("a diagnosis")
+
+    @property
+    def running(self) -> bool:
+        """Whether a diagnosis is being made."""
+        return self._work.running
 
     @property
     def enough(self) -> bool:
@@ -60,43 +72,48 @@ class GapBench:
         found = self.found
         return found is not None and found.shots is not None and found.shots != self._ids()
 
-    def diagnose(self, calibrated: bool, progress: Progress | None = None) -> None:
-        """Diagnose the session's points against the nominal or the calibrated arm.
+    def diagnose(self, calibrated: bool, progress: Progress, finished: Finished) -> None:
+        """Begin to diagnose the session's points against the nominal or the calibrated arm; this returns at once.
 
         Raises:
-            InputError: there is no calibrated arm, or the points do not allow a diagnosis.
+            InputError: there is no calibrated arm, or a diagnosis is being made already.
         """
-        if calibrated and self.arm is None:
+        arm = self.arm if calibrated else None
+        if calibrated and arm is None:
             raise InputError("No solution of the whole arm is there yet: solve first, or compare with the nominal arm.")
+        of = f"this session and {'the last solution' if calibrated else 'the nominal arm'}"
         shots = self._ids()
-        sim = "the last solution" if calibrated else "the nominal arm"
-        self._diagnose(
-            to_campaign(self._bench.state), self.arm if calibrated else None, f"this session and {sim}", shots, progress
-        )
+        self._begin(_diagnosed, (to_campaign(self._bench.state), arm), of, shots, progress, finished)
 
-    def diagnose_archive(self, data: bytes, name: str, progress: Progress | None = None) -> None:
-        """Diagnose an uploaded campaign, a ZIP file of its folder, against its own sim.
+    def diagnose_archive(self, data: bytes, name: str, progress: Progress, finished: Finished) -> None:
+        """Begin to diagnose an uploaded campaign, a ZIP file of its folder, against its own sim.
 
         Raises:
-            InputError: it cannot be read, or its points do not allow a diagnosis.
+            InputError: a diagnosis is being made already.
         """
-        self._diagnose(read_campaign_archive(data, name), None, name, None, progress)
+        self._begin(_diagnosed_archive, (data, name), name, None, progress, finished)
 
-    def _diagnose(
+    def stop(self) -> None:
+        """Give up the diagnosis that is being made, if any."""
+        self._work.stop()
+
+    def _begin(
         self,
-        campaign: Campaign,
-        arm: CalibratedArm | None,
+        work: Callable[..., GapReport],
+        arguments: tuple,
         of: str,
         shots: tuple[int, ...] | None,
-        progress: Progress | None,
+        progress: Progress,
+        finished: Finished,
     ) -> None:
-        # It takes long to import: not before it is asked for.
-        from core.gap.diagnosis import diagnose
-
         session = self._bench.session
-        report = diagnose(campaign, arm, progress=progress)
-        self._found = session, Diagnosed(report, of, shots)
-        self._bench.changed()
+
+        def ended(report: GapReport | None, why_not: str) -> None:
+            if report is not None:
+                self._found = session, Diagnosed(report, of, shots)
+            finished(why_not)
+
+        self._work.start(work, arguments, lambda told: progress(*told), ended)
 
     def _counting(self) -> list[tuple[int, str]]:
         """Ids and targets of the shots that count and show a point."""
@@ -104,3 +121,15 @@ class GapBench:
 
     def _ids(self) -> tuple[int, ...]:
         return tuple(number for number, _ in self._counting())
+
+
+def _diagnosed(tell: Tell, campaign: Campaign, arm: CalibratedArm | None = None) -> GapReport:
+    """The other process: the report alone, as the corrected sim beside it holds functions, which no pipe takes."""
+    from core.gap.diagnosis import diagnose
+
+    found = diagnose(campaign, arm, progress=lambda done, what: tell((done, what)))
+    return GapReport(**{field.name: getattr(found, field.name) for field in fields(GapReport)})
+
+
+def _diagnosed_archive(tell: Tell, data: bytes, name: str) -> GapReport:
+    return _diagnosed(tell, read_campaign_archive(data, name))

@@ -28,7 +28,7 @@ class GapTabs:
     ) -> None:
         gui = server.gui
         self._gaps = GapBench(bench)
-        self.panel = GapPanel(self._gaps, GapView(server), ask)
+        self.panel = GapPanel(self._gaps, GapView(server), ask, self.refresh)
         self._tab = LateTab(left, LABEL, lambda: self.panel.build(gui), before="4 Export")
         self._plots = LateTab(right, LABEL, lambda: self.panel.build_plots(gui))
 
@@ -40,6 +40,11 @@ class GapTabs:
         if there:
             self.panel.refresh()
         elif was:
+            self.panel.forget()
+
+    def stop(self) -> None:
+        """End what runs beside the dashboard."""
+        if self._tab.there:
             self.panel.forget()
 
     def show_dark(self, dark: bool) -> None:

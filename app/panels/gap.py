@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import viser
 
+from app.beside import STOPPED
 from app.figures.gap_map import gap_map_figure
 from app.figures.gap_steps import gap_steps_figure
 from app.figures.gap_vectors import gap_vectors_figure
 from app.figures.gap_where import gap_records_figure
-from app.gap_bench import Diagnosed, GapBench
+from app.gap_bench import Diagnosed, Finished, GapBench
 from app.gap_view import GapView
 from app.gap_words import causes_words, intro_words, next_words, numbers_words, verdict_words, working_words
 from app.panels.plot_box import WIDTH_PX, PlotBox
@@ -30,19 +31,23 @@ LONGEST_LABEL = 60
 class GapPanel:
     """The tab at the left, and its plots at the right."""
 
-    def __init__(self, gaps: GapBench, view: GapView, ask: Callable) -> None:
-        self._gaps, self._view, self._ask = gaps, view, ask
+    def __init__(self, gaps: GapBench, view: GapView, ask: Callable, changed: Callable[[], None]) -> None:
+        """``changed`` is called after another diagnosis was made."""
+        self._gaps, self._view, self._ask, self._changed = gaps, view, ask, changed
         self._drawn: Diagnosed | None = None
         self._plotted: Diagnosed | None = None
         self._switches: list[tuple[Switch, viser.GuiCheckboxHandle]] = []
         self._plots: dict[str, PlotBox] = {}
+        self._there = False
 
     def build(self, gui: viser.GuiApi) -> None:
         """Fill the tab at the left."""
-        self._gui, self._drawn, self._switches = gui, None, []
+        self._gui, self._drawn, self._switches, self._there = gui, None, [], True
         gui.add_html(intro_words())
         self._sim = gui.add_dropdown("The sim is", (NOMINAL, CALIBRATED))
         gui.add_button("Diagnose", icon=viser.Icon.STETHOSCOPE).on_click(self._diagnose)
+        self._stop = gui.add_button("Stop", color="red", visible=False)
+        self._stop.on_click(lambda event: self._ask(event, lambda client: self._gaps.stop(), at_once=True))
         self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
         self._working = gui.add_html("")
         self._verdict = gui.add_html("")
@@ -88,8 +93,9 @@ class GapPanel:
             self._draw_plots()
 
     def forget(self) -> None:
-        """Take the arrows out of the scene."""
-        self._drawn = None
+        """The tab is gone: take the arrows out of the scene, and give up what is being made."""
+        self._there, self._drawn = False, None
+        self._gaps.stop()
         self._view.show(None, 0)
 
     @property
@@ -99,34 +105,47 @@ class GapPanel:
 
     def _diagnose(self, event: viser.GuiEvent) -> None:
         calibrated = self._sim.value == CALIBRATED
-        self._ask(event, self._at_work(lambda: self._gaps.diagnose(calibrated, self._progress)))
+        self._begin(event, lambda finished: self._gaps.diagnose(calibrated, self._progress, finished))
 
     def _uploaded(self, event: viser.GuiEvent) -> None:
         file = event.target.value
         name = "".join(c for c in file.name if c.isprintable())[:LONGEST_LABEL] or "the file"
 
-        def work() -> None:
+        def begin(finished: Finished) -> None:
             if len(file.content) > LARGEST_UPLOAD:
                 raise InputError(f"{name} has {len(file.content) / 1e6:.0f} MB, expected at most 64 MB")
-            self._gaps.diagnose_archive(file.content, name, self._progress)
+            self._gaps.diagnose_archive(file.content, name, self._progress, finished)
 
-        self._ask(event, self._at_work(work))
+        self._begin(event, begin)
 
-    def _at_work(self, work: Callable[[], None]) -> Callable[[object], None]:
-        """A job during which the bar is there."""
+    def _begin(self, event: viser.GuiEvent, begin: Callable[[Finished], None]) -> None:
+        """Begin a diagnosis; the queue of jobs is free again at once, and hears of the end."""
+
+        def ended(why_not: str) -> None:
+            self._ask(event, lambda client: self._ended(why_not), operator=False)
 
         def job(client: object) -> None:
-            self._progress(0.0, "reading")
-            self._bar.visible = True
-            try:
-                work()
-            finally:
-                self._bar.visible = False
-                self._working.content = ""
+            begin(ended)
+            self._show_working(True)
 
-        return job
+        self._ask(event, job)
+
+    def _ended(self, why_not: str) -> None:
+        if not self._there:
+            return
+        self._show_working(False)
+        self._changed()
+        if why_not not in ("", STOPPED):
+            raise InputError(why_not)
+
+    def _show_working(self, working: bool) -> None:
+        self._bar.visible = self._stop.visible = working
+        self._bar.value = 0.0
+        self._working.content = working_words("starting") if working else ""
 
     def _progress(self, done: float, text: str) -> None:
+        if not self._there:
+            return
         self._bar.value = 100.0 * min(max(done, 0.0), 1.0)
         self._working.content = working_words(text)
 

@@ -1,24 +1,30 @@
 """The diagnosis on the workbench, and what the dashboard says of it, with diagnoses made by hand."""
 
+import queue
 import sys
+import time
 from types import ModuleType
 
 import pytest
 
+from app.beside import STOPPED
 from app.gap_bench import LEAST_POINTS, Diagnosed, GapBench
 from app.gap_words import causes_words, next_words, numbers_words, verdict_words, working_words
 from app.workbench import Workbench
-from core.errors import InputError
+from core.errors import CampaignError, InputError
+from core.gap.result import GapReport
 from core.session import Session
 from core.session_campaign import open_campaign
 from core.session_store import SUFFIX
 from core.twin import irb_l6
 from core.twin.demo import demo_events
+from tests.app import in_thread
 from tests.app.command_line import SAMPLES
 from tests.core import gap_reports
 from tests.core.test_campaign_archive import packed, sample
 
 HOSTILE = "<script>window.broken=1</script><img src=x>"
+PATIENCE_S = 120
 MADE = ("explained", "partly_explained", "unexplained", "no_gap", "barely_known")
 
 
@@ -36,7 +42,15 @@ def asked(monkeypatch):
 
     module.diagnose = diagnose
     monkeypatch.setitem(sys.modules, "core.gap.diagnosis", module)
+    monkeypatch.setattr("app.beside.started", in_thread.started)
     return calls
+
+
+def ended(begin, *arguments) -> tuple[str, list[float]]:
+    """What a diagnosis says at its end, and the shares of the work that it told."""
+    told, ends = [], queue.Queue()
+    begin(*arguments, lambda done, text: told.append(done), ends.put)
+    return ends.get(timeout=PATIENCE_S), told
 
 
 @pytest.fixture
@@ -61,11 +75,9 @@ def test_a_new_session_has_not_points_enough(tmp_path):
 
 
 def test_the_session_is_diagnosed_and_grows_old_when_it_changes(bench, asked):
-    gaps, told, changed = GapBench(bench), [], []
-    bench.on_change(lambda: changed.append(gaps.found is not None))
-    gaps.diagnose(False, lambda done, text: told.append(done))
-    assert changed == [True]
-    assert told == [1.0]
+    gaps = GapBench(bench)
+    assert ended(gaps.diagnose, False) == ("", [1.0])
+    assert not gaps.running
     assert asked[0][1] is None
     assert asked[0][0].measurements.count == 165
     assert "nominal" in gaps.found.of
@@ -77,30 +89,72 @@ def test_the_session_is_diagnosed_and_grows_old_when_it_changes(bench, asked):
 def test_the_last_solution_may_be_the_sim(bench, asked):
     gaps = GapBench(bench)
     with pytest.raises(InputError, match="solve first"):
-        gaps.diagnose(True)
+        ended(gaps.diagnose, True)
     bench.solving.solve()
-    gaps.diagnose(True)
+    ended(gaps.diagnose, True)
     assert asked[0][1] is gaps.arm
     assert gaps.arm.robot.joint_count == 6
 
 
 def test_an_uploaded_campaign_is_its_own_matter(bench, asked):
     gaps = GapBench(bench)
-    gaps.diagnose_archive(packed(sample()), "mine.zip")
+    assert ended(gaps.diagnose_archive, packed(sample()), "mine.zip") == ("", [1.0])
     assert gaps.found.of == "mine.zip"
     assert gaps.found.shots is None
     bench.decisions.exclude(bench.state.shots[3].id, "bumped")
     assert not gaps.outdated
-    with pytest.raises(InputError, match=r"odd\.zip cannot be unpacked"):
-        gaps.diagnose_archive(b"no archive", "odd.zip")
+    why_not, _ = ended(gaps.diagnose_archive, b"no archive", "odd.zip")
+    assert "odd.zip cannot be unpacked" in why_not
+    assert gaps.found.of == "mine.zip"
 
 
 def test_another_session_has_no_diagnosis_yet(bench, asked, tmp_path):
     gaps = GapBench(bench)
-    gaps.diagnose(False)
+    ended(gaps.diagnose, False)
     bench.switch(open_campaign(SAMPLES / "irb_l6", tmp_path / f"b{SUFFIX}"))
     assert gaps.found is None
     bench.session.close()
+
+
+@pytest.mark.slow
+def test_a_diagnosis_in_its_own_process_holds_up_neither_a_shot_nor_a_solution(bench):
+    gaps, told, ends = GapBench(bench), queue.Queue(), queue.Queue()
+    begun = time.monotonic()
+    gaps.diagnose(False, lambda done, text: told.put((done, text)), ends.put)
+    assert time.monotonic() - begun < 1
+    with pytest.raises(InputError, match="a diagnosis is being made already"):
+        gaps.diagnose(False, print, print)
+    told.get(timeout=PATIENCE_S)
+    bench.decisions.exclude(bench.state.shots[3].id, "bumped")
+    bench.solving.solve()
+    assert gaps.running
+    assert ends.get(timeout=PATIENCE_S) == ""
+    shares = [told.get()[0] for _ in range(told.qsize())]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert type(gaps.found.report) is GapReport
+    assert gaps.found.report.campaign.measurements.count == 165
+    assert gaps.outdated
+
+
+def test_a_diagnosis_can_be_stopped(bench):
+    gaps, told, ends = GapBench(bench), queue.Queue(), queue.Queue()
+    gaps.diagnose(False, lambda done, text: told.put(done), ends.put)
+    told.get(timeout=PATIENCE_S)
+    gaps.stop()
+    assert ends.get(timeout=PATIENCE_S) == STOPPED
+    assert gaps.found is None
+    assert not gaps.running
+
+
+def test_why_there_is_no_diagnosis_is_said(bench, asked, monkeypatch):
+    def refuse(campaign, arm=None, told=None, progress=None):
+        raise CampaignError("the campaign says nothing of its joints")
+
+    monkeypatch.setattr(sys.modules["core.gap.diagnosis"], "diagnose", refuse)
+    gaps = GapBench(bench)
+    assert ended(gaps.diagnose, False) == ("the campaign says nothing of its joints", [])
+    assert gaps.found is None
 
 
 @pytest.mark.parametrize("name", MADE)

@@ -1,4 +1,4 @@
-"""Kill -9 at random moments of measuring, undoing, solving and exporting: nothing shown is lost, the step is the same."""
+"""Kill -9 at random moments of measuring, undoing, solving, exporting: nothing shown is lost, the step is the same."""
 
 import json
 import os

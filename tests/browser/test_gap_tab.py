@@ -22,6 +22,7 @@ from core.session_campaign import open_campaign
 from core.session_store import SUFFIX
 from core.twin import irb_l6
 from core.twin.demo import demo_events
+from tests.app import in_thread
 from tests.app.command_line import SAMPLES
 from tests.browser.test_dashboard import chromium, press, tab, visit, wait_for_text  # noqa: F401
 from tests.core import gap_reports
@@ -41,6 +42,7 @@ def diagnose(monkeypatch):
 
     module.diagnose = diagnose
     monkeypatch.setitem(sys.modules, "core.gap.diagnosis", module)
+    monkeypatch.setattr("app.beside.started", in_thread.started)
     return module
 
 

@@ -1,0 +1,64 @@
+"""A running dashboard, without a browser, while a diagnosis is made: whoever measures or solves does not wait for it."""
+
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from app.dashboard import Dashboard
+from app.workbench import Workbench
+from core.session import Session
+from core.session_store import SUFFIX
+from core.twin import irb_l6
+from core.twin.demo import demo_events
+
+PATIENCE_S = 60.0
+
+
+@pytest.fixture
+def dashboard(tmp_path):
+    session = Session.create(tmp_path / f"demo{SUFFIX}", demo_events(irb_l6.cell()), by="A. Operator")
+    bench = Workbench(session)
+    bench.runs.run(True)
+    bench.decisions.undo()
+    running = Dashboard(bench, port=0)
+    yield running
+    running.stop()
+
+
+def until(there) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while not there():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_measuring_and_solving_do_not_wait_for_a_diagnosis_and_stop_ends_it(dashboard):
+    panel, bench = dashboard.gap.panel, dashboard.bench
+    panel._diagnose(SimpleNamespace(client=None))
+    dashboard.jobs.wait()
+    assert panel._bar.visible
+    assert panel._stop.visible
+    until(lambda: panel._bar.value > 0)
+    shots = len(bench.state.shots)
+    dashboard.acquire.measure(None)
+    dashboard.solve.solve(None)
+    dashboard.jobs.wait()
+    assert len(bench.state.shots) == shots + 1
+    assert bench.calibration is not None
+    assert dashboard.gap._gaps.running
+    assert panel._bar.visible
+    dashboard.gap._gaps.stop()
+    until(lambda: not panel._bar.visible)
+    assert not panel._stop.visible
+    assert dashboard.gap._gaps.found is None
+
+
+def test_a_diagnosis_ends_with_its_tab(dashboard):
+    dashboard.gap.panel._diagnose(SimpleNamespace(client=None))
+    dashboard.jobs.wait()
+    for _ in range(120):
+        dashboard.bench.session.undo()
+    dashboard.bench.changed()
+    assert not dashboard.gap._tab.there
+    until(lambda: not dashboard.gap._gaps.running)
