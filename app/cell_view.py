@@ -115,6 +115,12 @@ class CellView:
         """Where to look from, for the arm as it stands."""
         return presets(self.arm.bones, self.arm.net, self._stations, self._floor_m, self._extremes())
 
+    def _view(self) -> Array:
+        """From the arm to the eye that sees it as a whole, unit, (3,)."""
+        camera = next(c for c in self.cameras() if c.name == "Arm")
+        way = camera.position_m - camera.look_at_m
+        return way / np.linalg.norm(way)
+
     def _extremes(self) -> tuple[Array, ...]:
         """Net displacements at both ends of every planned sweep, (n,) each: the view should hold all of them."""
         first, last = {}, {}
@@ -191,7 +197,7 @@ class CellView:
             self._axes.place(marks, self.tube_exaggeration)
             return
         sliding = self._bench.nominal.sliding
-        look = {"radius_m": 0.0022 * reach, "exaggeration": self.tube_exaggeration}
+        look = {"radius_m": 0.0022 * reach, "exaggeration": self.tube_exaggeration, "view": self._view()}
         self._axes = AxesView(self._viewer, "/axes", marks, sliding, length, **look)
 
     def forget(self) -> None:
@@ -227,11 +233,8 @@ class CellView:
             return
         if self._diagnosis is None and wanted:
             geometry, reach = found.estimate.geometry, self.arm.bones.reach_m
-            camera = next(c for c in self.cameras() if c.name == "Arm")
-            way = camera.position_m - camera.look_at_m
-            direction = way / np.linalg.norm(way)
             self._diagnosis = DiagnosisView(
-                self._viewer, found.nominal, geometry, geometry.base, reach, self._exaggeration, direction
+                self._viewer, found.nominal, geometry, geometry.base, reach, self._exaggeration, self._view()
             )
         if self._diagnosis is not None:
             self._diagnosis.visible = wanted

@@ -20,6 +20,7 @@ from app.clicks import Ear
 from app.gap_tabs import GapTabs
 from app.jobs import Jobs
 from app.panels.acquire import AcquirePanel
+from app.panels.bring_forward import bring_forward
 from app.panels.check import CheckPanel
 from app.panels.export import ExportPanel
 from app.panels.help import HelpPanel
@@ -28,7 +29,7 @@ from app.panels.seat import Seat
 from app.panels.solve import SolvePanel
 from app.panels.start import StartPanel
 from app.panels.view import ViewPanel
-from app.scene.cameras import Camera, fly_to
+from app.scene.cameras import Camera, fit_once, fly_to
 from app.spots import spot_named
 from app.uploads import guard_uploads
 from app.verify_tabs import VerifyTabs
@@ -53,6 +54,7 @@ class Dashboard:
         self.host, self.port = host, self.server.get_port()
         self.server.gui.configure_theme(**THEME)
         self.seat = Seat(self.server)
+        self.server.on_client_connect(self._greet)
         self.server.on_client_disconnect(lambda client: self.results.tabs.left(client.client_id))
         guard_uploads(self.server, self.seat.may, self._refuse)
         self._dark = False
@@ -80,6 +82,7 @@ class Dashboard:
         with tabs.add_tab("Check"):
             self.check = CheckPanel(gui, bench, self.ask)
         with tabs.add_tab("2 Measure"):
+            bring_forward(gui, "This sweep")
             self.acquire = AcquirePanel(gui, bench, self.ask)
         with tabs.add_tab("3 Solve"):
             self.solve = SolvePanel(gui, bench, self.ask)
@@ -183,6 +186,10 @@ class Dashboard:
         """What a browser sees first: the arm, with its instruments behind."""
         camera, first = self._first_camera(), self.server.initial_camera
         first.position, first.look_at, first.up = (tuple(v) for v in (camera.position_m, camera.look_at_m, camera.up))
+
+    def _greet(self, client: viser.ClientHandle) -> None:
+        """Fit what a new browser sees first to its picture."""
+        fit_once(client, self._first_camera(), self.server.initial_camera.position)
 
     def _look_again(self) -> None:
         """Bring all browsers to where the arm is now."""

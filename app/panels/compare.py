@@ -7,6 +7,7 @@ import viser
 from app.compare_bench import MOST_TRIALS, CompareBench
 from app.compare_words import intro_words, progress_words, table_words, verdict_words
 from app.figures.comparison import orientation_comparison_figure, position_comparison_figure
+from app.panels.bring_forward import bringing
 from app.panels.plot_box import WIDTH_PX, PlotBox
 from core.errors import InputError
 from core.rivals.comparison import Comparison
@@ -28,6 +29,7 @@ class ComparePanel:
     def build(self, gui: viser.GuiApi) -> None:
         """Fill the tab at the left."""
         self._there = True
+        self._bring = gui.add_html("")
         gui.add_html(intro_words())
         self._trials = gui.add_number("Trials", TRIALS, min=1, max=MOST_TRIALS, step=1)
         gui.add_button("Compare", color="green", icon=viser.Icon.SCALE).on_click(self._compare)
@@ -42,6 +44,7 @@ class ComparePanel:
         self._boxes = PlotBox(gui, "compare-positions", ""), PlotBox(gui, "compare-orientations", "")
         self._table = gui.add_html("")
         self._drawn = None
+        self._bring.content = bringing("Methods")
 
     def forget(self) -> None:
         """The tab at the left is gone, and with it what is being made."""
@@ -51,6 +54,7 @@ class ComparePanel:
     def forget_plots(self) -> None:
         """The tab at the right is gone."""
         self._boxes = None
+        self._bring.content = ""
 
     def show_dark(self, dark: bool) -> None:
         """Draw for a dark or a light page."""

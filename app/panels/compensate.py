@@ -7,6 +7,7 @@ import viser
 
 from app.compensate_bench import CompensateBench, Compensated
 from app.compensate_words import intro_words, summary_words, table_words
+from app.panels.bring_forward import bringing
 from core.errors import InputError
 from core.inverse_kinematics import Tolerance
 
@@ -28,6 +29,7 @@ class CompensatePanel:
     def build(self, gui: viser.GuiApi) -> None:
         """Fill the tab at the left."""
         self._drawn = None
+        self._bring = gui.add_html("")
         gui.add_html(intro_words())
         self._text = gui.add_text("Poses", "", multiline=True)
         fill = gui.add_button("Fill in test poses", hint="An example: the planned test poses, with their joint values.")
@@ -48,6 +50,7 @@ class CompensatePanel:
     def build_table(self, gui: viser.GuiApi) -> None:
         """Fill the tab at the right."""
         self._table, self._drawn = gui.add_html(""), None
+        self._bring.content = bringing("Commands")
 
     def refresh(self) -> None:
         """Show the last poses that were compensated."""
@@ -62,6 +65,7 @@ class CompensatePanel:
     def forget_table(self) -> None:
         """The tab at the right is gone."""
         self._table, self._drawn = None, None
+        self._bring.content = ""
 
     def _fill(self, event: viser.GuiEvent) -> None:
         def job(client: object) -> None:

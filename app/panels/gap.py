@@ -14,6 +14,7 @@ from app.figures.gap_where import gap_records_figure
 from app.gap_bench import Diagnosed, Finished, GapBench
 from app.gap_view import GapView
 from app.gap_words import causes_words, intro_words, next_words, numbers_words, verdict_words, working_words
+from app.panels.bring_forward import bring_forward
 from app.panels.plot_box import WIDTH_PX, PlotBox
 from core.errors import InputError
 from core.gap.ledger import Switch, switches
@@ -42,6 +43,7 @@ class GapPanel:
 
     def build(self, gui: viser.GuiApi) -> None:
         """Fill the tab at the left."""
+        bring_forward(gui, "Gap")
         self._gui, self._drawn, self._switches, self._there = gui, None, [], True
         gui.add_html(intro_words())
         self._sim = gui.add_dropdown("The sim is", (NOMINAL, CALIBRATED))

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import viser
 
+from app.panels.bring_forward import bring_forward
 from app.solve_words import summary_words, unsolved_words
 from app.table_2 import limits_of
 from app.words import block
@@ -28,6 +29,7 @@ class SolvePanel:
         self._drawn: Calibration | None = None
         self._shown: tuple | None = None
         self._found: Calibration | None = None
+        bring_forward(gui, "Residuals", "Drives", "Axes", "Geometry")
         gui.add_html(
             block(
                 "<h3>Solve</h3><p>Axes, drives, couplings and the arm's parameters from all shots that count. "

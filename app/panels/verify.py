@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import viser
 
 from app.figures.pose_errors import loop_figures
+from app.panels.bring_forward import bring_forward
 from app.panels.plot_box import WIDTH_PX, PlotBox
 from app.panels.typed_points import TypedPoints
 from app.pose_bench import LIMITS, NextVisit, PoseBench, TestPose
@@ -48,6 +49,7 @@ class VerifyPanel:
 
     def build(self, gui: viser.GuiApi) -> None:
         """Fill the tab at the left."""
+        bring_forward(gui, "Poses")
         self._step = gui.add_html("")
         self._typed = TypedPoints(gui, self._bench)
         gui.add_button("Measure pose", color="green", icon=viser.Icon.CROSSHAIR, hint="V").on_click(self.measure)

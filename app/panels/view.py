@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 MAGNIFICATION = (10, 1000, 10)
 EXAGGERATION = (1, 500, 1)
 """Least, most and step of how many times too large residuals and differences are drawn."""
+JOINT = "Joint "
+"""Before the number of a joint in the name of its view."""
 WIDEST = 720.0
 """Deg or mm, of a slider for a joint without limits."""
 
@@ -34,9 +36,15 @@ class ViewPanel:
     ) -> None:
         """``may`` says whether who changed something may do so: what is drawn is drawn for all."""
         self._cell, self._may = cell, may
-        names = tuple(camera.name for camera in cell.cameras())
-        self._camera = gui.add_dropdown("Look at", names, initial_value=names[0])
-        self._camera.on_update(self._fly)
+        names = [camera.name for camera in cell.cameras()]
+        joints = tuple(str(number) for number in range(1, len(cell.joints) + 1))
+        # Buttons, not a list: whoever has turned the view away goes back to the same one.
+        for label, options, prefix in (
+            ("Look at", tuple(n for n in names if n.removeprefix(JOINT) not in joints), ""),
+            ("Joint", joints, JOINT),
+        ):
+            group = gui.add_button_group(label, options)
+            group.on_click(lambda event, prefix=prefix: self._fly(event, f"{prefix}{event.target.value}"))
         self._ghost = gui.add_checkbox("Nominal arm as a ghost", False)
         self._errors = gui.add_checkbox("Residual vectors", False)
         self._times = self._slider(gui, "Residuals ×", MAGNIFICATION, 200, self._magnify)
@@ -109,8 +117,8 @@ class ViewPanel:
 
         handle.on_update(changed)
 
-    def _fly(self, event: "viser.GuiEvent") -> None:
-        camera = next((c for c in self._cell.cameras() if c.name == self._camera.value), None)
+    def _fly(self, event: "viser.GuiEvent", name: str) -> None:
+        camera = next((c for c in self._cell.cameras() if c.name == name), None)
         if camera is not None and event.client is not None:
             fly_to(event.client, camera)
 

@@ -8,14 +8,22 @@ from numpy.typing import ArrayLike
 
 from app.scene.colours import FITTED_AXIS, HIGHLIGHT, NOMINAL_AXIS, Rgb, round_down
 from app.scene.group import SceneGroup, Viewer, add_frame, add_solid
+from app.scene.link_shapes import Skeleton
+from app.scene.picture import picture_directions
 from app.scene.poses import link_motions, pose_of
 from app.scene.solids import Solid, arrow, lathe
-from core.geometry import Array, Line
+from core.geometry import Array, Line, apply
 
 if TYPE_CHECKING:
     import viser
 
 TUBE_OPACITY = 0.28
+TAIL, TIP = -1 / 3, 2 / 3
+"""Ends of an arrow from its joint, as shares of its length."""
+LABEL_SHARES = (TIP, TAIL, 0.48, 0.85)
+"""Where on its axis a label may stand, the best place first."""
+LABEL_WIDTH, LABEL_HEIGHT = 0.26, 0.11
+"""Labels further apart than this in a picture of the arm do not overlap, as shares of the arrows' length."""
 LENGTH_OF_REACH = 0.8
 """A good length of arrows, as a share of an arm's reach: long enough for all tips to stand clear of the arm."""
 
@@ -47,7 +55,29 @@ def axis_arrow(mark: AxisMark, length_m: float, radius_m: float) -> Solid:
 def axis_ends(mark: AxisMark, length_m: float) -> tuple[Array, Array]:
     """Tail and tip of the arrow of an axis, each (3,)."""
     middle = mark.line.foot_of(mark.middle_m)
-    return middle - length_m / 3 * mark.line.direction, middle + 2 * length_m / 3 * mark.line.direction
+    return middle + TAIL * length_m * mark.line.direction, middle + TIP * length_m * mark.line.direction
+
+
+def label_shares(middles_m: Array, directions: Array, length_m: float, view: ArrayLike) -> tuple[float, ...]:
+    """Where on each axis its label stands, a share of the arrows' length from the joint, so that none covers another.
+
+    Axes that lie together, as those of a stretched wrist do, get their labels at different ends or distances. Where
+    there is no free place, the label keeps the tip.
+
+    Args:
+        middles_m: of the arrows, (n, 3).
+        directions: of the axes, unit, (n, 3).
+        length_m: of the arrows.
+        view: from the arm to the eye, (3,).
+    """
+    picture = np.stack(picture_directions(view)) / (length_m * np.array([[LABEL_WIDTH], [LABEL_HEIGHT]]))
+    chosen, taken = [], np.zeros((0, 2))
+    for middle, direction in zip(middles_m, directions, strict=True):
+        places = {share: picture @ (middle + share * length_m * direction) for share in LABEL_SHARES}
+        free = (s for s, p in places.items() if not (np.abs(taken - p) < 1.0).all(axis=1).any())
+        chosen.append(next(free, TIP))
+        taken = np.vstack([taken, places[chosen[-1]]])
+    return tuple(chosen)
 
 
 def tube_radius_m(mark: AxisMark, along_m: ArrayLike, exaggeration: float) -> Array:
@@ -95,16 +125,23 @@ class AxesView(SceneGroup):
         colour: Rgb = FITTED_AXIS,
         radius_m: float = 0.004,
         exaggeration: float = 1.0,
+        view: ArrayLike = (0.4, -0.8, 0.35),
     ) -> None:
-        """Draw the axes of joints 1..n, in that order, as they are with all joints at zero."""
+        """Draw the axes of joints 1..n, in that order, as they are with all joints at zero.
+
+        ``view`` is the direction from the arm to the eye, (3,), in which no label covers another.
+        """
         super().__init__(viewer, root)
         self._colour = colour
         self._length, self._radius, self._exaggeration = length_m, radius_m, exaggeration
         self._marks, self._sliding = tuple(marks), np.asarray(sliding, dtype=bool)
         self._lit: int | None = None
+        self._view = np.asarray(view, dtype=float)
+        self._net = np.zeros(len(self._marks))
+        self._shares: dict[int, float] = {}
         self._nodes = [self._node(mark) for mark in marks]
         self._shafts = [self._arrow(mark, colour, radius_m) for mark in marks]
-        self._labels = [self._label(mark) for mark in marks if mark.text]
+        self._labels = {mark.joint: self._label(mark) for mark in marks if mark.text}
         self._tubes: dict[int, viser.MeshHandle] = {}
         self._draw_tubes()
 
@@ -116,8 +153,7 @@ class AxesView(SceneGroup):
             for node, shaft, mark in zip(self._nodes, self._shafts, self._marks, strict=True):
                 node.position = mark.middle_m
                 shaft.vertices = self._shaft(mark, self._radius).vertices_m.astype(np.float32)
-            for label, mark in zip(self._labels, [m for m in self._marks if m.text], strict=True):
-                label.position = self._tip(mark)
+            self._spread_labels(moved=True)
             self._draw_tubes()
 
     def show(self, net: ArrayLike) -> None:
@@ -127,6 +163,8 @@ class AxesView(SceneGroup):
             for node, mark, motion in zip(self._nodes, self._marks, motions[:-1], strict=True):
                 pose = pose_of(motion, mark.middle_m)
                 node.position, node.wxyz = pose.position_m, pose.wxyz
+            self._net = np.asarray(net, dtype=float)
+            self._spread_labels()
 
     def highlight(self, joint: int | None) -> None:
         """Draw one axis, 1..n, thick and in the colour of attention, and the others as usual; None: none."""
@@ -150,11 +188,11 @@ class AxesView(SceneGroup):
 
     @property
     def labels_visible(self) -> bool:
-        return all(label.visible for label in self._labels)
+        return all(label.visible for label in self._labels.values())
 
     @labels_visible.setter
     def labels_visible(self, visible: bool) -> None:
-        for label in self._labels:
+        for label in self._labels.values():
             label.visible = visible
 
     def _node(self, mark: AxisMark) -> "viser.FrameHandle":
@@ -166,13 +204,27 @@ class AxesView(SceneGroup):
     def _shaft(self, mark: AxisMark, radius_m: float) -> Solid:
         return axis_arrow(mark, self._length, radius_m).about(mark.middle_m)
 
-    def _tip(self, mark: AxisMark) -> Array:
-        """Where the label stands, from the node of the axis."""
-        return axis_ends(mark, self._length)[1] - mark.middle_m
+    def _label_place(self, mark: AxisMark, share: float) -> Array:
+        """Where the label stands, from the node of the axis, (3,)."""
+        return mark.line.foot_of(mark.middle_m) + share * self._length * mark.line.direction - mark.middle_m
 
     def _label(self, mark: AxisMark) -> "viser.LabelHandle":
-        name, tip = f"{self._root}/{mark.joint}/label", self._tip(mark)
-        return self._scene.add_label(name, mark.text, position=tip, anchor="bottom-center", font_screen_scale=1.05)
+        name, place = f"{self._root}/{mark.joint}/label", self._label_place(mark, TIP)
+        return self._scene.add_label(name, mark.text, position=place, anchor="bottom-center", font_screen_scale=1.05)
+
+    def _spread_labels(self, moved: bool = False) -> None:
+        """Put the labels where none covers another as the joints stand; ``moved``: also those that keep their end."""
+        motions = link_motions(tuple(m.line for m in self._marks), self._sliding, self._net)[:-1]
+        labelled = [(mark, motion) for mark, motion in zip(self._marks, motions, strict=True) if mark.text]
+        if not labelled:
+            return
+        middles = np.stack([apply(motion, mark.line.foot_of(mark.middle_m)) for mark, motion in labelled])
+        directions = np.stack([motion[:3, :3] @ mark.line.direction for mark, motion in labelled])
+        shares = label_shares(middles, directions, self._length, self._view)
+        for (mark, _), share in zip(labelled, shares, strict=True):
+            if moved or share != self._shares.get(mark.joint, TIP):
+                self._labels[mark.joint].position = self._label_place(mark, share)
+            self._shares[mark.joint] = share
 
     def _draw_tubes(self) -> None:
         solids = [(mark, uncertainty_tube(mark, self._length, self._exaggeration)) for mark in self._marks]
@@ -189,6 +241,14 @@ class AxesView(SceneGroup):
     def _mesh(self, mark: AxisMark, part: str, solid: Solid, colour: Rgb, opacity: float | None) -> "viser.MeshHandle":
         name = f"{self._root}/{mark.joint}/{part}"
         return add_solid(self._scene, name, solid, colour, opacity, side="double" if opacity else "front")
+
+
+def axis_tips(bones: Skeleton, net: ArrayLike) -> Array:
+    """Where the labels of an arm's axes usually stand, at net displacements (n,): (n, 3)."""
+    motions = link_motions(bones.axes, bones.sliding, net)
+    length = TIP * LENGTH_OF_REACH * bones.reach_m
+    tips = [hub + length * line.direction for hub, line in zip(bones.hubs_m, bones.axes, strict=True)]
+    return np.stack([apply(motion, tip) for motion, tip in zip(motions, tips, strict=False)])
 
 
 def nominal_axes(

@@ -1,13 +1,16 @@
 """Views worth having: everything, the arm, each joint, the tool, through each instrument; and the flight to one."""
 
+import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from app.scene.axes import axis_tips
 from app.scene.link_shapes import Skeleton
+from app.scene.picture import UP, picture_directions
 from app.scene.poses import link_motions
 from app.scene.stations import Station
 from core.geometry import Array, apply, cross
@@ -15,7 +18,6 @@ from core.geometry import Array, apply, cross
 if TYPE_CHECKING:
     import viser
 
-UP = np.array([0.0, 0.0, 1.0])
 FIELD_OF_VIEW_RAD = 0.75
 """Upright; a long lens, because wide ones make lengths look wrong."""
 WIDTH_OF_HEIGHT = 0.75
@@ -32,6 +34,8 @@ class Camera:
     look_at_m: Array
     up: Array
     field_of_view_rad: float = FIELD_OF_VIEW_RAD
+    stays: bool = False
+    """Whether the eye is where it must be, as behind a telescope."""
 
     def __post_init__(self) -> None:
         for value in (self.position_m, self.look_at_m, self.up):
@@ -39,6 +43,14 @@ class Camera:
                 raise ValueError(f"a camera needs three points or directions of three finite numbers, got {value}")
         if np.linalg.norm(self.look_at_m - self.position_m) < 1e-9:
             raise ValueError("a camera cannot look at the point where it stands")
+
+    def fitting(self, width_of_height: float) -> "Camera":
+        """The same view where the picture is narrower than views are made for: from further away, or with a wider
+        lens."""
+        more = max(WIDTH_OF_HEIGHT / max(width_of_height, 0.1), 1.0)
+        if self.stays:
+            return replace(self, field_of_view_rad=2.0 * np.arctan(more * np.tan(self.field_of_view_rad / 2)))
+        return replace(self, position_m=self.look_at_m + more * (self.position_m - self.look_at_m))
 
 
 def presets(
@@ -68,7 +80,7 @@ def presets(
     close = 0.32 * bones.reach_m
     return (
         around("All", np.vstack([arm, *spots, *feet]), side + 0.25 * UP, 1.2),
-        around("Arm", arm, side, 1.3),
+        around("Arm", np.vstack([arm, axis_tips(bones, net)]), side, 1.1),
         *(near(f"Joint {k}", point, side, close) for k, point in enumerate(joints, 1)),
         near("Tool", tool, side, close),
         *(through(station, arm) for station in stations if np.linalg.norm(arm.mean(axis=0) - station.position_m) > 0.2),
@@ -99,9 +111,7 @@ def around(name: str, points_m: Array, direction: Array, margin: float = 1.0) ->
     """A view from a direction that holds all points, (m, 3)."""
     away = direction / np.linalg.norm(direction)
     middle = (points_m.min(axis=0) + points_m.max(axis=0)) / 2
-    right = cross(UP, away)
-    right = right / np.linalg.norm(right)
-    over = cross(away, right)
+    right, over = picture_directions(away)
     offsets = points_m - middle
     size = np.maximum(np.abs(offsets @ over), np.abs(offsets @ right) / WIDTH_OF_HEIGHT)
     distance = np.max(margin * size / np.tan(FIELD_OF_VIEW_RAD / 2) + offsets @ away)
@@ -123,7 +133,7 @@ def through(station: Station, points_m: Array) -> Camera:
     radius = float(np.linalg.norm(points_m - middle, axis=1).max())
     view = 2.0 * np.arctan(1.1 * radius / distance)
     # Just ahead of the telescope, which would otherwise fill the picture.
-    return Camera(station.name, eye + 0.25 * way / distance, middle, UP, float(np.clip(view, 0.15, 1.4)))
+    return Camera(station.name, eye + 0.25 * way / distance, middle, UP, float(np.clip(view, 0.15, 1.4)), stays=True)
 
 
 def between(start: Camera, end: Camera, share: float) -> Camera:
@@ -144,14 +154,35 @@ def between(start: Camera, end: Camera, share: float) -> Camera:
 
 
 def fly_to(client: "viser.ClientHandle", camera: Camera, seconds: float = 0.6) -> None:
-    """Bring a client's camera to a view, in a flight of some seconds (0: at once); call it from a worker thread."""
+    """Bring a client's camera to a view, in a flight of some seconds (0: at once); call it from a worker thread.
+
+    The view is fitted to the client's picture.
+    """
     start = _now(client)
+    camera = camera if start is None else camera.fitting(client.camera.aspect)
     steps = 0 if start is None else int(seconds * FRAMES_A_SECOND)
     began = time.monotonic()
     for k in range(1, steps):
         _set(client, between(start, camera, k / steps))
         time.sleep(max(0.0, began + k * seconds / steps - time.monotonic()))
     _set(client, camera)
+
+
+def fit_once(client: "viser.ClientHandle", first: Camera, starts_m: ArrayLike) -> None:
+    """Bring a new browser to its first view as soon as its panels leave the picture its width.
+
+    ``starts_m`` is where browsers begin to look from, (3,); a view that somebody has moved since is left alone.
+    """
+    whole, fitted = client.camera.aspect, threading.Event()
+
+    def changed(camera: "viser.CameraHandle") -> None:
+        if camera.aspect == whole or fitted.is_set():
+            return
+        fitted.set()
+        if np.allclose(camera.position, starts_m, atol=1e-3):
+            fly_to(client, first, seconds=0.0)
+
+    client.camera.on_update(changed)
 
 
 def _now(client: "viser.ClientHandle") -> Camera | None:

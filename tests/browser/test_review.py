@@ -21,6 +21,11 @@ MIDDLE = """() => { const r = __viserMutable.canvas.getBoundingClientRect();
 POINTS = """() => { let n = 0; __viserMutable.nodeRefFromName['/points/kept']?.traverse(o => {
   n = Math.max(n, o.instancesCount ?? 0) }); return n }"""
 PLOT = "() => [...document.querySelectorAll('.js-plotly-plot')].find(p => p.offsetParent)?.layout.title.text ?? ''"
+SEEN_AT = """([name, place]) => { const m = __viserMutable, o = m.nodeRefFromName[name];
+  o.updateWorldMatrix(true, false);
+  const v = o.position.clone().set(...place).applyMatrix4(o.matrixWorld).project(m.camera);
+  return [v.x, v.y] }"""
+OPEN = "() => [...document.querySelectorAll('[role=tab][aria-selected=true]')].map(tab => tab.title)"
 ARM = "() => JSON.stringify(__viserMutable.nodeRefFromName['/arm/link6'].matrixWorld.elements)"
 
 
@@ -55,7 +60,7 @@ def client_of(dashboard: Dashboard):
 
 
 def stands_at(client, camera: Camera) -> bool:
-    return bool(np.allclose(client.camera.position, camera.position_m, atol=1e-3))
+    return bool(np.allclose(client.camera.position, camera.fitting(client.camera.aspect).position_m, atol=1e-3))
 
 
 def colour_of(dashboard: Dashboard, node: str) -> tuple[int, ...]:
@@ -157,6 +162,9 @@ def test_a_point_is_chosen_by_a_click_excluded_and_brought_back(page, dashboard)
     page.wait_for_timeout(400)
     page.mouse.click(*middle)
     wait_for_text(page, "shot", f"Record {again.record}")
+    page.get_by_label("Reason", exact=True).filter(visible=True).click()
+    page.get_by_role("option", name="target was bumped").click()
+    page.wait_for_timeout(200)
     press(page, "Exclude")
     until(lambda: bench.state.shot(again.id).verdict == "excluded")
     page.wait_for_function(f"() => ({POINTS})() === {kept - 1}")
@@ -181,3 +189,47 @@ def test_a_slider_moves_the_arm_and_a_button_brings_it_back(page, dashboard):
     assert moved == pytest.approx(np.deg2rad(0.5), abs=np.deg2rad(0.06))
     press(page, "Back to the robot's pose")
     page.wait_for_function(f"before => ({ARM})() === before", arg=at_first)
+
+
+def open_tabs(page) -> list[str]:
+    page.wait_for_timeout(400)
+    return page.evaluate(OPEN)
+
+
+def test_a_step_brings_its_results_forward_and_a_later_choice_stays(page):
+    for step, result in (("2 Measure", "This sweep"), ("3 Solve", "Residuals"), ("Verify", "Poses"), ("Gap", "Gap")):
+        page.get_by_role("tab", name=step, exact=True).first.click()
+        assert open_tabs(page) == [step, result]
+    tab(page, "Axes")
+    assert open_tabs(page) == ["Gap", "Axes"]
+    tab(page, "3 Solve")
+    press(page, "Solve")
+    assert open_tabs(page) == ["3 Solve", "Axes"]
+    tab(page, "Compensate")
+    assert open_tabs(page) == ["Compensate", "Axes"]
+    press(page, "Fill in test poses")
+    page.wait_for_timeout(500)
+    press(page, "Compensate")
+    page.get_by_role("tab", name="Commands", exact=True).wait_for()
+    assert open_tabs(page) == ["Compensate", "Commands"]
+
+
+def test_a_view_can_be_asked_for_again_and_all_labels_of_axes_are_in_it(page, dashboard):
+    tab(page, "View")
+    arm = next(c for c in dashboard.cell.cameras() if c.name == "Arm")
+    for _ in range(2):
+        group(page, "All")
+        until(lambda: not stands_at(client_of(dashboard), arm))
+        group(page, "Arm")
+        until(lambda: stands_at(client_of(dashboard), arm))
+    page.wait_for_timeout(300)
+    for joint in range(1, 7):
+        label = dashboard.server.scene.get_handle_by_name(f"/axes/{joint}/label")
+        seen = page.evaluate(SEEN_AT, [f"/axes/{joint}", [float(x) for x in label.position]])
+        assert np.abs(seen).max() < 0.95, joint
+
+
+def test_the_first_view_is_fitted_to_the_picture(page, dashboard):
+    arm = next(c for c in dashboard.cell.cameras() if c.name == "Arm")
+    assert client_of(dashboard).camera.aspect < 0.7
+    until(lambda: stands_at(client_of(dashboard), arm))
