@@ -1,4 +1,4 @@
-"""A running dashboard, without a browser, while a diagnosis is made: whoever measures or solves does not wait for it."""
+"""A running dashboard, without a browser, while a diagnosis is made: who measures or solves does not wait for it."""
 
 import time
 from types import SimpleNamespace

@@ -1,6 +1,5 @@
 """A running dashboard in trouble, without a browser: full disks, damaged sessions, values that no page would send."""
 
-import resource
 import sqlite3
 from collections.abc import Callable
 from contextlib import contextmanager
@@ -16,6 +15,7 @@ from core.session_events import NoteWritten
 from core.session_store import SUFFIX
 from core.twin import irb_l6
 from core.twin.demo import demo_events
+from tests.core.no_room import no_file_may_grow_beyond
 
 ODD = {
     str: ("", " ", "x" * 5000, "<script>", "\0", "\n" * 50, "1e999", "nan", "-1", "1 2 3", "../../etc/passwd"),
@@ -49,17 +49,6 @@ def running(path, monkeypatch):
         yield dashboard, told
     finally:
         dashboard.stop()
-
-
-@contextmanager
-def no_file_may_grow_beyond(size: int):
-    """The system refuses to write beyond a size, as it does on a full disk."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_a_full_disk_is_told_nothing_is_lost_and_it_goes_on_when_there_is_room(path, monkeypatch):

@@ -1,17 +1,15 @@
 """Session files: one writer at a time, older and newer formats, no room, no right to write; list, search, copy."""
 
-import os
-import resource
 import shutil
 import sqlite3
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from no_room import as_nobody, no_file_may_grow_beyond
 from session_scenes import busy_session, demo_session, take
 
 from core import session_entries, session_library, session_reader, session_store
@@ -23,7 +21,6 @@ from core.session_events import Fact, NoteWritten, OperatorNamed, SessionError, 
 from core.session_library import copy_session, free_path, import_session, list_sessions, search
 
 SEEN = Reading((1.0, 2.0, 3.0))
-NOBODY = 65534
 HOLD = """
 import sys
 from core.session import Session
@@ -48,30 +45,6 @@ def open_folder() -> Iterator[Path]:
     yield folder
     folder.chmod(0o777)
     shutil.rmtree(folder)
-
-
-@contextmanager
-def as_nobody() -> Iterator[None]:
-    """Root may write everywhere; others may not."""
-    if os.geteuid() != 0:
-        yield
-        return
-    os.seteuid(NOBODY)
-    try:
-        yield
-    finally:
-        os.seteuid(0)
-
-
-@contextmanager
-def no_file_may_grow_beyond(size: int) -> Iterator[None]:
-    """The system refuses to write beyond a size, as it does on a full disk."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def note(number: int) -> str:
