@@ -19,7 +19,7 @@ def isolability_lines(found: Isolability, tried: Sequence[Addition]) -> list[str
     named = sum(one.named for one in found.effects)
     hidden = sum(not one.limit.shown for one in found.effects)
     confused = len(found.effects) - named - hidden
-    known = "all geometry fitted, the sim being as drawn" if found.drawn else "geometry known as calibrated"
+    known = "all geometry fitted, the sim being as drawn" if found.drawn else "geometry known to 0.1 mm, 0.1 mrad"
     return [
         "What these points will be able to tell apart (trueaxis gap)",
         f"  smallest effect that would be found, mm rms at the targets; noise {found.noise_m * 1e3:.3f} mm, {known}",
@@ -32,7 +32,7 @@ def isolability_lines(found: Isolability, tried: Sequence[Addition]) -> list[str
 
 
 def _addition(one: Addition) -> str:
-    does = [f"tells {one.pairs} pairs apart"] if one.pairs else []
+    does = [f"tells {one.pairs} {'pair' if one.pairs == 1 else 'pairs'} apart"] if one.pairs else []
     does += [f"shows {one.shown} more"] if one.shown else []
     return f"{one.words} ({one.points} points): {', '.join(does)}"
 

@@ -57,12 +57,14 @@ APP = """
     app.paths app.progress app.output app.standard_output app.summary
     app.figures app.scene app.report_page app.report_cells app.report_words app.report_tables
     app.captions app.report_scene app.report_html
-    app.verification_report app.gap_tables app.gap_report app.gap_summary app.isolability_summary app.blind_report
+    app.verification_report app.gap_tables app.gap_report app.gap_summary app.blind_report
+    app.isolability_summary app.isolability_report
     app.comparison_report app.comparison_summary
     app.rigs app.ahead app.rigged_session app.shooting app.robot_runs app.typed_shots app.decisions app.solving
     app.known_so_far app.sweep_progress app.workbench app.pose_bench app.beside app.jobs app.spots app.clicks
     app.words app.table_2 app.cell_view
     app.glossary app.keys app.uploads app.exports app.event_words app.measure_words app.cell_words app.solve_words
+    app.review_words
     app.pose_view app.pose_words app.compensate_bench app.compensate_words app.compare_bench app.compare_words
     app.gap_bench app.gap_words app.gap_view app.panels app.verify_tabs app.gap_tabs
     app.dashboard

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.isolability_report import isolability_html
 from app.isolability_summary import isolability_lines
 from app.output import OutputFile, require_writable, write_files
 from app.progress import Progress
@@ -17,7 +18,8 @@ from core.campaign_files import read_campaign
 from core.errors import InputError
 from core.gap.additions import Addition, additions
 from core.gap.isolability import Isolability, isolability
-from core.gap.isolability_json import isolability_record
+from core.gap.isolability_json import isolability_json, isolability_record
+from core.gap.planned import as_planned, with_noise
 from core.measurements import Campaign
 from core.planning.mounts import with_bar
 from core.planning.plan_files import PLAN_FORMAT, assumptions, plan_csv, plan_json
@@ -37,13 +39,16 @@ from core.planning.site import Repeats, Site
 from core.planning.site_makers import calibrated_site, narrowed, nominal_site, targets_on_links
 from core.robot_files import read_robot
 from core.theodolite import Theodolite
+from core.wording import is_simulated
 
 SHOTS = 129
 """As many as table 1 of the paper has."""
 MOST_SHOTS = 2000
 SECONDS_A_SHOT = 40.0
 SIGMA_MM = 0.1
-PLAN_FILES = {"plan.csv", "plan.json"}
+DRAWN, CALIBRATED = "drawn", "calibrated"
+SIMS = (DRAWN, CALIBRATED)
+PLAN_FILES = {"plan.csv", "plan.json", "plan.html"}
 EPILOG = """What is planned for: a campaign that was measured once (its calibration tells where the arm, the targets and
 the base stand, and how well points repeat), a robot.toml alone (its base is then the instrument's frame), or, with
 nothing given, the simulated demo cell. Poses that matter are those within the ranges of the campaign's sweeps, else
@@ -52,7 +57,10 @@ within the middle half of all joints' ranges.
 Targets are seen if every --station sees them; two stations with --sigma-arcsec are theodolites, whose points are less
 exact the farther away they are. What is written: plan.csv, the commands with the columns of measurements.csv and no
 points yet, and plan.json with what to expect: how exact the arm will be, and which causes of a sim-to-real gap the
-points will show and tell apart."""
+points will show and tell apart. plan.html is that as a page.
+
+With --judge nothing is proposed: the campaign's own rows are judged, whether they hold points yet or not, with the
+noise that it states or that --sigma-mm and --repeatability-mm give. All other options are then without meaning."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +120,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="keep a joint's commands within, deg (mm where it slides)",
     )
     parser.add_argument("--seconds-a-shot", type=_above_zero, metavar="T", help="default: as in the campaign, else 40")
+    parser.add_argument(
+        "--judge",
+        choices=SIMS,
+        help="say what the campaign's own rows could tell apart, with a sim as drawn or calibrated",
+    )
     parser.add_argument("--json", action="store_true", help="print the JSON on standard output, nothing else")
     parser.epilog = EPILOG
 
@@ -125,6 +138,9 @@ def run(arguments: argparse.Namespace) -> None:
     folder: Path = arguments.out
     require_writable(folder)
     _require_replaceable(folder)
+    if arguments.judge is not None:
+        _judge(arguments, folder)
+        return
     with Progress(5) as progress:
         progress.step("reading")
         given = _given(arguments)
@@ -140,7 +156,9 @@ def run(arguments: argparse.Namespace) -> None:
         progress.step("writing")
         title = given.campaign.title if given.campaign else ""
         text = plan_json(proposal, saved, given.seconds_a_shot, title, isolability_record(told.found, told.tried))
-        write_files(folder, (OutputFile("plan.csv", plan_csv(proposal)), OutputFile("plan.json", text)))
+        page = isolability_html(told.found, told.tried, title, simulated=_simulated(given.campaign))
+        files = (("plan.csv", plan_csv(proposal)), ("plan.json", text), ("plan.html", page))
+        write_files(folder, tuple(OutputFile(*file) for file in files))
     print_result(_summary(proposal, saved, told, given, folder), text, as_json=arguments.json)
 
 
@@ -202,6 +220,35 @@ def _seconds_a_shot(campaign: Campaign | None) -> float:
     return usual if usual > 0 else SECONDS_A_SHOT
 
 
+def _judge(arguments: argparse.Namespace, folder: Path) -> None:
+    """What the rows of a campaign, measured or not, could tell apart."""
+    source: Path | None = arguments.source
+    if source is None or source.is_file():
+        raise InputError("--judge is of the rows of a campaign, expected a campaign folder")
+    with Progress(3) as progress:
+        progress.step("reading")
+        campaign = read_campaign(source)
+        noisy = with_noise(campaign, _in_m(arguments.sigma_mm), _in_m(arguments.repeatability_mm))
+        progress.step("asking which causes of a gap the rows will tell apart")
+        found = isolability(as_planned(noisy), drawn=arguments.judge == DRAWN)
+        tried = additions(found)
+        progress.step("writing")
+        text = isolability_json(found, tried, campaign.title)
+        page = isolability_html(found, tried, campaign.title, simulated=is_simulated(campaign))
+        write_files(folder, (OutputFile("plan.json", text), OutputFile("plan.html", page)))
+    lines = [campaign.title or campaign.robot.name, *isolability_lines(found, tried)]
+    written = f"Written: {folder / 'plan.json'}, {folder / 'plan.html'}"
+    print_result("\n".join([*lines, "", written]), text, as_json=arguments.json)
+
+
+def _in_m(length_mm: float | None) -> float | None:
+    return None if length_mm is None else length_mm * 1e-3
+
+
+def _simulated(campaign: Campaign | None) -> bool:
+    return campaign is not None and is_simulated(campaign)
+
+
 def _told_apart(proposal: Proposal, given: Given) -> ToldApart:
     """A site of a campaign is that of a calibrated arm; of a drawing neither geometry nor targets are settled."""
     calibrated = given.campaign is not None
@@ -230,7 +277,7 @@ def _summary(proposal: Proposal, saved: Saving | None, told: ToldApart, given: G
     if proposal.unobservable:
         lines.append(f"Note: {proposal.unobservable} combinations of unknowns are not shown by these shots")
     lines += [f"Note: {sentence}" for sentence in assumptions(proposal)]
-    return "\n".join([*lines, "", f"Written: {folder / 'plan.csv'}, {folder / 'plan.json'}"])
+    return "\n".join([*lines, "", f"Written: {', '.join(str(folder / name) for name in sorted(PLAN_FILES))}"])
 
 
 def _row(proposal: Proposal, k: int) -> str:

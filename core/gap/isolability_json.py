@@ -9,7 +9,10 @@ from core.gap.isolability_field import STATED, Limit
 from core.gap.parameter_units import PART, unit_of
 from core.gap.place_words import place_words
 from core.gap.planned import untested
-from core.json_values import Json, mm, number
+from core.json_values import Json, json_text, mm, number
+from core.version import VERSION
+
+PLAN_FORMAT = "trueaxis-plan/1"
 
 
 def isolability_record(found: Isolability, tried: Sequence[Addition]) -> Json:
@@ -23,6 +26,26 @@ def isolability_record(found: Isolability, tried: Sequence[Addition]) -> Json:
         "additions": [_addition_record(one) for one in tried],
         "not_tested": list(untested(found.problem)),
     }
+
+
+def isolability_json(found: Isolability, tried: Sequence[Addition], title: str) -> str:
+    """The text of the plan.json of a campaign whose own rows are judged.
+
+    Args:
+        title: of the campaign.
+    """
+    return json_text(
+        {
+            "format": PLAN_FORMAT,
+            "trueaxis": VERSION,
+            "units": "lengths in mm, angles in rad or deg as the key says",
+            "robot": found.problem.sim.seen.campaign.robot.name,
+            "campaign": title,
+            "kind": "own",
+            "shots": found.problem.sim.seen.count,
+            "isolability": isolability_record(found, tried),
+        }
+    )
 
 
 def shown_size(limit: Limit) -> tuple[float, str]:

@@ -45,6 +45,51 @@ def with_expected_points(campaign: Campaign, base: Array) -> Campaign:
     return replace(campaign, measurements=replace(table, point_m=points))
 
 
+def with_noise(campaign: Campaign, sigma_m: float | None, repeatability_m: float | None) -> Campaign:
+    """The same campaign with the noise to expect of every point.
+
+    Args:
+        sigma_m: the instrument's, of one coordinate; None: as the campaign states.
+        repeatability_m: the arm's, of one coordinate; None: none beside the instrument's noise.
+
+    Raises:
+        CampaignError: nothing is stated for some row, and nothing given.
+    """
+    table = campaign.measurements
+    stated = np.isfinite(table.covariance_m2).all(axis=(1, 2)) & (sigma_m is None)
+    sigma_m = campaign.instrument.sigma_m if sigma_m is None else sigma_m
+    if sigma_m is None and (~stated & (table.target >= 0)).any():
+        raise CampaignError(
+            "the campaign does not state how exact its points will be, expected sigma_mm of the instrument or of rows"
+        )
+    covariance = np.where(stated[:, None, None], table.covariance_m2, (sigma_m or np.nan) ** 2 * np.eye(3))
+    covariance = covariance + (repeatability_m or 0.0) ** 2 * np.eye(3)
+    return replace(campaign, measurements=replace(table, covariance_m2=covariance))
+
+
+def as_planned(campaign: Campaign) -> Campaign:
+    """A campaign as if all of it were still to be measured, its points where they are expected.
+
+    Where nothing was measured yet, the robot's base is the instrument's frame, and every target needs its likely place;
+    else base and targets are where the measured points put them.
+
+    Raises:
+        CampaignError: a sighted target has no place on its link and was never measured.
+    """
+    if not campaign.measurements.seen.any():
+        return with_expected_points(campaign, np.eye(4))
+    seen = observe(campaign)
+    sim = place(seen, np.where(seen.check, 0.0, 1.0) if not seen.check.all() else np.ones(seen.count))
+    shown = set(seen.target)
+    found = tuple(
+        replace(target, point_m=tuple(sim.target_m[t].tolist()), sigma_m=target.sigma_m if target.point_m else np.inf)
+        if t in shown
+        else target
+        for t, target in enumerate(campaign.targets)
+    )
+    return with_expected_points(replace(campaign, targets=found), sim.base)
+
+
 def planned_problem(campaign: Campaign) -> Problem:
     """Columns of everything that a diagnosis of these points would look through; no residuals.
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from core.gap.isolability_json import PLAN_FORMAT
 from core.geometry import Array
 from core.json_values import Json, degrees, json_text, mm, number
 from core.measurement_writer import measurements_csv
@@ -13,8 +14,6 @@ from core.robot import Robot
 from core.robot_builders import to_source_frame
 from core.session_plan import PlannedSweep
 from core.version import VERSION
-
-PLAN_FORMAT = "trueaxis-plan/1"
 
 
 def plan_csv(proposal: Proposal) -> str:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -37,7 +38,7 @@ def planned(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
 
 def test_it_writes_the_commands_and_what_to_expect(planned: tuple[str, Path]) -> None:
     kind, out = planned
-    assert set(contents(out)) == {"plan.csv", "plan.json"}
+    assert set(contents(out)) == {"plan.csv", "plan.json", "plan.html"}
     document, rows = plan_of(out), rows_of(out / "plan.csv")
     assert document["format"] == "trueaxis-plan/1"
     assert (document["kind"], document["shots"], document["seed"]) == (kind, 80, 1)
@@ -89,6 +90,54 @@ def test_the_summary_has_a_table_of_limits_effect_by_joint(tmp_path: Path) -> No
     total, named, confused, hidden = (int(word) for word in counts.replace(",", "").split() if word.isdigit())
     assert total == named + confused + hidden
     assert any(line.startswith("  add ") for line in lines)
+
+
+def test_the_page_says_the_same_for_a_reader(planned: tuple[str, Path]) -> None:
+    _, out = planned
+    page = (out / "plan.html").read_text(encoding="utf-8")
+    found = plan_of(out)["isolability"]["effects"]
+    named = sum(one["told_apart"] for one in found)
+    assert f"{named} of {len(found)} effects would be found and named" in page
+    assert "SIMULATED: no robot was measured" in page
+    assert "Gear ratio" in page
+
+
+class TestJudged:
+    """The campaign's own rows instead of a proposal."""
+
+    def judge(self, campaign: Path, out: Path, *options: object):
+        return trueaxis("plan", campaign, "--judge", *(options or ("calibrated",)), "--out", out)
+
+    def test_of_a_measured_campaign_its_own_rows_are_judged(self, tmp_path: Path) -> None:
+        done = self.judge(CAMPAIGN, tmp_path)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert set(contents(tmp_path)) == {"plan.json", "plan.html"}
+        document = plan_of(tmp_path)
+        assert (document["format"], document["kind"]) == ("trueaxis-plan/1", "own")
+        assert document["isolability"]["noise_mm"] == pytest.approx(0.11, abs=0.02)
+        assert "effects" in done.stdout
+
+    def test_the_noise_may_be_said(self, tmp_path: Path) -> None:
+        options = ("calibrated", "--sigma-mm", 0.03, "--repeatability-mm", 0.04)
+        assert self.judge(CAMPAIGN, tmp_path, *options).returncode == 0
+        assert plan_of(tmp_path)["isolability"]["noise_mm"] == pytest.approx(0.05)
+
+    def test_points_need_not_be_measured_where_targets_are_known_roughly(self, tmp_path: Path) -> None:
+        campaign = copy_of_sample(tmp_path)
+        edit_rows(campaign, lambda rows: [row | {"x_mm": "", "y_mm": "", "z_mm": ""} for row in rows])
+        refused = self.judge(campaign, tmp_path / "out")
+        assert_refused(refused, "target 'T2' has no place on its link")
+        text = (campaign / "campaign.toml").read_text(encoding="utf-8")
+        placed = re.sub(r"(link = [234]\n)", r"\1xyz_mm = [150.0, 40.0, 20.0]\n", text)
+        (campaign / "campaign.toml").write_text(placed, encoding="utf-8")
+        done = self.judge(campaign, tmp_path / "out", "drawn")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert sum(one["seen"] for one in plan_of(tmp_path / "out")["isolability"]["effects"]) > 70
+
+    def test_what_has_no_rows_is_refused(self, tmp_path: Path) -> None:
+        robot = CAMPAIGN / "robot.toml"
+        assert_refused(self.judge(robot, tmp_path / "out"), "--judge", "campaign folder")
+        assert_refused(trueaxis("plan", "--judge", "drawn", "--out", tmp_path / "out"), "--judge", "campaign folder")
 
 
 def test_commands_are_within_the_limits_of_the_robot(planned: tuple[str, Path]) -> None:
