@@ -66,6 +66,8 @@ class CellView:
         """How many times too wide the tubes of uncertainty about the axes are."""
         self.scale = ResidualScale(1e-3)
         """Colours of residuals since the last solution."""
+        self.chosen: int | None = None
+        """Id of the shot that somebody has clicked."""
         self.shown_shots: tuple[int, ...] = ()
         """Ids of the shots in the rows of ``points``."""
 
@@ -153,6 +155,7 @@ class CellView:
         verdicts = np.array([_verdict(s.verdict) for s in shots], dtype=int)
         self.points.show(PointMarks(np.arange(len(shots)), points, self._colours([s.record for s in shots]), verdicts))
         self.points.mark_last(points[-1] if len(points) else None)
+        self.choose(self.chosen)
         self.stations.aim(points[-1] if len(points) else None)
         self._show_circle()
         expected = self._bench.known.expected()
@@ -160,6 +163,15 @@ class CellView:
             self.points.expect(None)
         else:
             self.points.expect(expected.point_m, expected.axis)
+
+    def choose(self, number: int | None) -> None:
+        """Mark a shot that somebody has clicked; None, or one that is not shown: none."""
+        self.chosen = number
+        shot = None if number is None or number not in self.shown_shots else self._bench.state.shot(number)
+        if shot is None:
+            self.points.mark_chosen(None)
+        else:
+            self.points.mark_chosen(shot.taken.point_m, f"record {shot.record}")
 
     def _show_circle(self) -> None:
         """The circle of the sweep that was measured last, as far as it is known."""

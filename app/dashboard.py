@@ -20,7 +20,7 @@ from app.clicks import Ear
 from app.gap_tabs import GapTabs
 from app.jobs import Jobs
 from app.panels.acquire import AcquirePanel
-from app.panels.bring_forward import bring_forward
+from app.panels.bring_forward import Openers, bring_forward
 from app.panels.check import CheckPanel
 from app.panels.export import ExportPanel
 from app.panels.help import HelpPanel
@@ -55,7 +55,8 @@ class Dashboard:
         self.server.gui.configure_theme(**THEME)
         self.seat = Seat(self.server)
         self.server.on_client_connect(self._greet)
-        self.server.on_client_disconnect(lambda client: self.results.tabs.left(client.client_id))
+        self.openers = Openers()
+        self.server.on_client_disconnect(self._gone)
         guard_uploads(self.server, self.seat.may, self._refuse)
         self._dark = False
         self._draw_page()
@@ -191,6 +192,10 @@ class Dashboard:
         """Fit what a new browser sees first to its picture."""
         fit_once(client, self._first_camera(), self.server.initial_camera.position)
 
+    def _gone(self, client: viser.ClientHandle) -> None:
+        self.results.tabs.left(client.client_id)
+        self.openers.left(client)
+
     def _look_again(self) -> None:
         """Bring all browsers to where the arm is now."""
         self.cell.out_of_sight = False
@@ -220,9 +225,17 @@ class Dashboard:
             fly_to(client, camera)
 
     def _clicked(self, row: int, client_id: int) -> None:
-        """A shot was clicked in 3-D: choose it in the measuring panel."""
-        if self.seat.may(client_id) and 0 <= row < len(self.cell.shown_shots):
-            self.acquire.choose(self.cell.shown_shots[row])
+        """A shot was clicked in 3-D: choose it where it can be judged, and open that step; a second click: none."""
+        if not self.seat.may(client_id) or not 0 <= row < len(self.cell.shown_shots):
+            return
+        number = self.cell.shown_shots[row]
+        chosen = None if number == self.cell.chosen else number
+        self.cell.choose(chosen)
+        self.acquire.choose(chosen)
+        self.solve.review.choose(chosen)
+        client = self.server.get_clients().get(client_id)
+        if chosen is not None and client is not None:
+            self.openers.open(client, *(("3 Solve", "2 Measure") if self.bench.calibration else ("2 Measure",)))
 
     def _hotkeys(self) -> None:
         gui = self.server.gui

@@ -48,6 +48,15 @@ def unsolved_words(last: Solve | None, since: int, shots: int) -> str:
     return block(f"{_since(since)}<p class='soft'>Last solved {when} UTC{who}; press <b>Solve</b>.</p>", "solution")
 
 
+def changes_list(changes: tuple[Change, ...]) -> str:
+    """What is not as it was, the most telling first; empty: nothing."""
+    if not changes:
+        return ""
+    items = "".join(f"<li>{_change(change)}</li>" for change in changes[:MOST_CHANGES])
+    more = f"<li>and {len(changes) - MOST_CHANGES} more</li>" if len(changes) > MOST_CHANGES else ""
+    return f"<ul data-testid='changes' style='padding-left:18px;margin:4px 0'>{items}{more}</ul>"
+
+
 def _since(since: int) -> str:
     if not since:
         return ""
@@ -80,12 +89,7 @@ def _limits(found: Calibration, limits: Limits) -> str:
 def _changes(changes: tuple[Change, ...]) -> str:
     if not changes:
         return ""
-    items = "".join(f"<li>{_change(change)}</li>" for change in changes[:MOST_CHANGES])
-    more = f"<li>and {len(changes) - MOST_CHANGES} more</li>" if len(changes) > MOST_CHANGES else ""
-    return (
-        "<details><summary>What changed since the last solution</summary>"
-        f"<ul data-testid='changes' style='padding-left:18px;margin:4px 0'>{items}{more}</ul></details>"
-    )
+    return f"<details><summary>What changed since the last solution</summary>{changes_list(changes)}</details>"
 
 
 def _change(change: Change) -> str:

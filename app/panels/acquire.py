@@ -55,11 +55,11 @@ class AcquirePanel:
         self._table = gui.add_html("")
         with gui.add_folder("Chosen shot"):
             self._shot = gui.add_html("")
-            self._act_group = gui.add_button_group("This shot", ("Measure again", "Exclude", "Include"))
-            self._act_group.on_click(self._act)
             self._reason = gui.add_dropdown("Reason", REASONS, hint="Of excluding or skipping; kept with the shot.")
             self._words = gui.add_text("In my words", "", visible=False)
             self._reason.on_update(lambda _: setattr(self._words, "visible", self._reason.value == OWN_WORDS))
+            self._act_group = gui.add_button_group("This shot", ("Measure again", "Exclude", "Include"))
+            self._act_group.on_click(self._act)
         self._extra = ExtraStop(gui, bench, self._ask_at_rest)
 
     def refresh(self) -> None:
@@ -78,12 +78,12 @@ class AcquirePanel:
         self._run_group.visible = self._bar.visible = bench.rig.moves_itself
         self._show_run()
         chosen = None if self._chosen is None else state.shot(self._chosen)
-        self._shot.content = shot_words(chosen or self._last(), chosen is not None)
+        self._shot.content = shot_words(chosen or self._last(), chosen is not None, state)
         self._typed.refresh()
         self._extra.refresh()
 
-    def choose(self, number: int) -> None:
-        """Choose a shot, as by a click in 3-D."""
+    def choose(self, number: int | None) -> None:
+        """Choose a shot, as by a click in 3-D; None: the last one."""
         self._chosen = number
         self.refresh()
 
@@ -200,7 +200,7 @@ class AcquirePanel:
 
     def _exclude(self, number: int, reason: str) -> None:
         if not reason:
-            raise InputError("a shot is left out for a reason: choose one below, or write your own, then press Exclude")
+            raise InputError("A shot is left out for a reason: choose one, or write your own, then press Exclude.")
         self._bench.decisions.exclude(number, reason)
         self._unsay()
 
@@ -227,10 +227,10 @@ class AcquirePanel:
     def _last_verdict(self) -> str:
         last = next((s for s in reversed(self._bench.state.shots) if s.taken.phase == "sweep"), None)
         if last is None:
-            return verdict_words(None, False, None, None)
+            return verdict_words(None, False, None, self._bench.state)
         so_far = self._bench.known.so_far(last.taken.joint, last.taken.sweep)
         slides = bool(self._bench.nominal.sliding[last.taken.joint - 1])
-        return verdict_words(so_far, slides, self._bench.known.tool_std_m(so_far), self._bench.state.instrument.sigma_m)
+        return verdict_words(so_far, slides, self._bench.known.tool_std_m(so_far), self._bench.state)
 
     def _show_run(self) -> None:
         runs, spent = self._bench.runs, time.monotonic() - self._began

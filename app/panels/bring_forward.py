@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     import viser
 
 BRING = (
-    "const wanted=event.target.dataset.bring.split('|'),own=event.target.closest('[data-dock-group]');"
+    "const set=event.target.dataset,wanted=set.bring.split('|');"
+    "const own=set.anywhere?event.target:event.target.closest('[data-dock-group]');"
     "const look=left=>{const others=[...document.querySelectorAll('[role=tab]')].filter(t=>!own.contains(t));"
     "const found=wanted.map(w=>others.find(t=>t.title===w)).filter(Boolean);"
     "if(!found.length){if(left)setTimeout(look,100,left-1);return}"
@@ -29,6 +30,26 @@ def bringing(*labels: str) -> str:
     Where one of them is open already, it stays.
     """
     return f"<i class='ta-appearing' data-bring='{escape('|'.join(labels))}' onanimationstart=\"{BRING}\"></i>"
+
+
+class Openers:
+    """Opens a step for one browser, as something there was clicked."""
+
+    def __init__(self) -> None:
+        self._used: dict[int, viser.GuiHtmlHandle] = {}
+
+    def open(self, client: "viser.ClientHandle", *labels: str) -> None:
+        """Bring the first of these tabs forward, unless one of them is open already."""
+        used = self._used.pop(client.client_id, None)
+        if used is not None:
+            used.remove()
+        words = escape("|".join(labels))
+        piece = f"<i class='ta-appearing' data-anywhere='1' data-bring='{words}' onanimationstart=\"{BRING}\"></i>"
+        self._used[client.client_id] = client.gui.add_html(piece)
+
+    def left(self, client: "viser.ClientHandle") -> None:
+        """A browser is gone."""
+        self._used.pop(client.client_id, None)
 
 
 def bring_forward(gui: "viser.GuiApi", *labels: str) -> None:

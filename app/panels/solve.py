@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import viser
 
 from app.panels.bring_forward import bring_forward
+from app.panels.review import ReviewPanel
 from app.solve_words import summary_words, unsolved_words
 from app.table_2 import limits_of
 from app.words import block
@@ -40,6 +41,7 @@ class SolvePanel:
         )
         gui.add_button("Solve", icon=viser.Icon.CALCULATOR, hint="S").on_click(self.solve)
         self._busy = gui.add_html("")
+        self.review = ReviewPanel(gui, bench, ask)
         self._words = gui.add_html("")
         with gui.add_folder("Families of drives and couplings", expand_by_default=False):
             self._families = self._build_families(gui)
@@ -59,6 +61,7 @@ class SolvePanel:
     def refresh(self) -> None:
         """Show the last solution, if there is one."""
         bench, state = self._bench, self._bench.state
+        self.review.refresh()
         for key, box in self._families.items():
             box.value = str(state.settings.get(key, AS_DESIGNED))
         found, since, limits = bench.calibration, bench.solving.since_solved, limits_of(state.settings)

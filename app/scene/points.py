@@ -67,7 +67,7 @@ def cage(radius_m: float) -> Solid:
 
 
 class PointsView(SceneGroup):
-    """Nodes ``root/kept``, ``root/doubtful``, ``root/excluded``, ``root/last``, ``root/next``."""
+    """Nodes ``root/kept``, ``root/doubtful``, ``root/excluded``, ``root/last``, ``root/chosen``, ``root/next``."""
 
     def __init__(self, viewer: Viewer, root: str = "/points", radius_m: float = 0.011) -> None:
         super().__init__(viewer, root)
@@ -80,7 +80,7 @@ class PointsView(SceneGroup):
         }
         self._batches: dict[Verdict, viser.BatchedMeshHandle] = {}
         self._rows: dict[Verdict, np.ndarray] = {}
-        self._last, self._next = self._halo(), self._ghost()
+        self._last, self._next, self._chosen = self._halo(), self._ghost(), self._lens()
 
     def on_click(self, callback: OnClick) -> None:
         """Call back whenever a point is clicked; to be said before the first points are shown."""
@@ -95,6 +95,14 @@ class PointsView(SceneGroup):
     def mark_last(self, point_m: ArrayLike | None) -> None:
         """Surround the point that was measured last, (3,); None: no point."""
         self._put(self._last, point_m)
+
+    def mark_chosen(self, point_m: ArrayLike | None, text: str = "") -> None:
+        """Mark the point that somebody has chosen, (3,), with its name; None: none."""
+        if point_m is not None:
+            self._scene.add_label(
+                f"{self._root}/chosen/name", text, position=(0.0, 0.0, 3.0 * self._radius), anchor="bottom-center"
+            )
+        self._put(self._chosen, point_m)
 
     def expect(self, point_m: ArrayLike | None, facing: ArrayLike = (0.0, 0.0, 1.0)) -> None:
         """Show where the next target is expected, (3,), as a ring square to a unit vector; None: nowhere."""
@@ -149,6 +157,11 @@ class PointsView(SceneGroup):
         node = self._scene.add_frame(f"{self._root}/next", show_axes=False, visible=False)
         self._mark("next/ring", ring(np.zeros(3), [0.0, 0.0, 1.0], 4.5 * self._radius, 0.6 * self._radius), None)
         self._mark("next/ball", ball(np.zeros(3), 1.3 * self._radius), 0.5)
+        return node
+
+    def _lens(self) -> "viser.FrameHandle":
+        node = self._scene.add_frame(f"{self._root}/chosen", show_axes=False, visible=False)
+        self._mark("chosen/lens", ball(np.zeros(3), 2.2 * self._radius), 0.45)
         return node
 
     def _mark(self, part: str, solid: Solid, opacity: float | None) -> "viser.MeshHandle":

@@ -146,33 +146,74 @@ def test_a_tab_that_was_closed_shows_the_new_solution_when_it_is_opened(page, da
     dashboard.bench.solving.solve()
 
 
-def test_a_point_is_chosen_by_a_click_excluded_and_brought_back(page, dashboard):
-    bench = dashboard.bench
-    again = bench.shooting.measure_again(bench.state.shots[40].id)
-    kept = sum(shot.counts for shot in bench.state.shots)
-    page.wait_for_function(f"() => ({POINTS})() === {kept}")
-    point = np.array(again.taken.point_m)
+def click_in_3d(page, dashboard, point) -> None:
+    """Click a point as an operator does who has come close to it."""
     for view in (dashboard.cell.arm, dashboard.cell.ghost, dashboard.cell._axes, dashboard.cell.stations):
         view.visible = False
-    tab(page, "2 Measure")
     fly_to(client_of(dashboard), Camera("close", point + np.array([0.15, 0.12, 0.08]), point, UP), 0.0)
     page.wait_for_timeout(1200)
     middle = page.evaluate(MIDDLE)
     page.mouse.move(*middle)
     page.wait_for_timeout(400)
     page.mouse.click(*middle)
-    wait_for_text(page, "shot", f"Record {again.record}")
+    for view in (dashboard.cell.arm, dashboard.cell._axes, dashboard.cell.stations):
+        view.visible = True
+
+
+def choose_reason(page) -> None:
     page.get_by_label("Reason", exact=True).filter(visible=True).click()
     page.get_by_role("option", name="target was bumped").click()
     page.wait_for_timeout(200)
+
+
+def test_a_point_is_chosen_by_a_click_excluded_and_brought_back(page, dashboard):
+    bench = dashboard.bench
+    again = bench.shooting.measure_again(bench.state.shots[40].id)
+    kept = sum(shot.counts for shot in bench.state.shots)
+    page.wait_for_function(f"() => ({POINTS})() === {kept}")
+    tab(page, "2 Measure")
+    click_in_3d(page, dashboard, np.array(again.taken.point_m))
+    wait_for_text(page, "shot", f"Record {again.record}")
+    assert open_tabs(page)[0] == "2 Measure"
+    choose_reason(page)
     press(page, "Exclude")
     until(lambda: bench.state.shot(again.id).verdict == "excluded")
     page.wait_for_function(f"() => ({POINTS})() === {kept - 1}")
     press(page, "Undo")
     until(lambda: bench.state.shot(again.id).verdict == "kept")
     page.wait_for_function(f"() => ({POINTS})() === {kept}")
-    for view in (dashboard.cell.arm, dashboard.cell._axes, dashboard.cell.stations):
-        view.visible = True
+    dashboard.cell.choose(None)
+
+
+def test_leaving_a_clicked_point_out_shows_what_that_changes_and_undo_brings_it_back(page, dashboard):
+    bench = dashboard.bench
+    before = bench.solving.solve()
+    shot = next(s for s in bench.state.shots if s.counts and s.taken.joint == 2)
+    tab(page, "View")
+    click_in_3d(page, dashboard, np.array(shot.taken.point_m))
+    wait_for_text(page, "chosen", f"Record {shot.record}")
+    assert open_tabs(page)[0] == "3 Solve"
+    assert dashboard.server.scene.get_handle_by_name("/points/chosen/name").text == f"record {shot.record}"
+    press(page, "Exclude and solve again")
+    page.get_by_role("alert").filter(has_text="for a reason").wait_for()
+    assert bench.state.shot(shot.id).verdict == "kept"
+    choose_reason(page)
+    press(page, "Exclude and solve again")
+    wait_for_text(page, "effect", f"Record {shot.record} left out: what changed")
+    wait_for_text(page, "chosen", "Excluded: target was bumped")
+    used = [int(found.refinement.residuals.used.sum()) for found in (before, bench.calibration)]
+    assert used[1] == used[0] - 1
+    wait_for_text(page, "effect", f"points used: {used[0]} → {used[1]}")
+    noise = page.get_by_test_id("effect").inner_text()
+    assert f"→ {bench.calibration.estimate.noise_m * 1e3:.3f} mm" in noise or "noise" not in noise
+    press(page, "Undo and solve again")
+    wait_for_text(page, "effect", "taken back")
+    wait_for_text(page, "effect", f"points used: {used[1]} → {used[0]}")
+    assert bench.state.shot(shot.id).verdict == "kept"
+    assert bench.calibration.estimate.noise_m == pytest.approx(before.estimate.noise_m, rel=1e-9)
+    click_in_3d(page, dashboard, np.array(shot.taken.point_m))
+    page.wait_for_function("() => !document.querySelector('[data-testid=chosen]')?.offsetParent")
+    assert dashboard.cell.chosen is None
 
 
 def test_a_slider_moves_the_arm_and_a_button_brings_it_back(page, dashboard):
