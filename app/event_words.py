@@ -32,11 +32,17 @@ CHOICES: dict[type[Event], str] = {
 """Events that need no more words than their kind."""
 
 
+def stop_words(taken: ShotTaken, state: State) -> str:
+    """Which stop of its sweep a shot was taken at: ``stop 3``, or that it is beside the plan."""
+    planned = [row.stops for row in state.plan.sweeps if (row.joint, row.sweep) == (taken.joint, taken.sweep)]
+    return "an extra stop" if planned and taken.step >= planned[0] else f"stop {taken.step + 1}"
+
+
 def event_words(event: Event, state: State) -> str:
     """What an event of the session was, as the object of a sentence; plain text, not escaped."""
     if isinstance(event, ShotTaken):
         again = "the second measurement of " if event.replaces else ""
-        return f"{again}the shot of joint {event.joint}, stop {event.step + 1}, target {event.target}"
+        return f"{again}the shot of joint {event.joint}, {stop_words(event, state)}, target {event.target}"
     if isinstance(event, Judged):
         shot = state.shot(event.shots[0])
         record = "shots" if shot is None or len(event.shots) > 1 else f"record {shot.record}"

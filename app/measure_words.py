@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 
 from app.clicks import listening, saying
-from app.event_words import event_words
+from app.event_words import event_words, stop_words
 from app.glossary import term
 from app.sweep_progress import SweepProgress
 from app.words import block
@@ -16,7 +16,7 @@ from core.session_events import Event
 from core.session_live import Expected, SweepSoFar
 from core.session_plan import PlannedSweep, Step
 from core.session_state import Shot, State
-from core.wording import display_unit, fixed
+from core.wording import decimals_for, display_unit, fixed, two_digits
 
 SWEEP_WORD = "sweep-"
 """What a row of the table says when it is clicked, before joint and sweep: ``sweep-6-1``."""
@@ -98,15 +98,16 @@ def sweeps_table(rows: tuple[SweepProgress, ...], robot: Robot) -> str:
     return block(listening(f"<table data-testid='table1'><tr>{head}</tr>{body}</table>") + f"{hint}.</p>", "sweeps")
 
 
-def verdict_words(so_far: SweepSoFar | None, slides: bool, tool_std_m: float | None, stated_m: float | None) -> str:
+def verdict_words(so_far: SweepSoFar | None, slides: bool, tool_std_m: float | None, state: State) -> str:
     """The last shot's worth, and what is known if one stops now.
 
     Args:
         so_far: the sweep of the last shot; None: there is no shot.
         slides: whether its joint slides.
         tool_std_m: standard uncertainty of the axis' place at the tool; None: not known.
-        stated_m: what the instrument promises for one coordinate; None: nothing.
+        state: of the session, for the plan and what the instrument promises.
     """
+    stated_m = state.instrument.sigma_m
     if so_far is None:
         return block("<p class='soft'>No shot yet. Press <b>Measure</b>.</p>", "verdict")
     live, count = so_far.live, len(so_far.shots)
@@ -118,14 +119,17 @@ def verdict_words(so_far: SweepSoFar | None, slides: bool, tool_std_m: float | N
         return block(text + f"<p>{_not_defined(so_far, slides)}</p>", "verdict")
     fit, k = live.fit, count - 1
     scatter = fit.sigma_m * fit.noise_factor
-    which = f"Stop {so_far.shots[k].taken.step + 1} of joint {so_far.joint}"
-    text += f"<p>{which}: {_residuals(so_far, k)}; {term('predicted', 'Noise σ')} ±{_mm(scatter)} mm each"
+    shot, digits = so_far.shots[k].taken, decimals_for(scatter * 1e3)
+    which = f"{stop_words(shot, state)} of joint {so_far.joint}"
+    text += f"<p>{which[:1].upper()}{which[1:]}: {_residuals(so_far, k, digits)}; "
+    text += f"{term('predicted', 'Noise σ')} ±{fixed(scatter * 1e3, digits)} mm each"
     text += "" if np.isnan(live.chances[k]) else f", {term('chance', 'Chance')} {_percent(live.chances[k])}"
     text += ".</p>"
     if stated_m is not None and scatter > 1.5 * stated_m and fit.degrees_of_freedom > 8:
         text += (
             f"<p class='soft'>The sweep scatters {scatter / stated_m:.1f} times as much as the "
-            f"{term('stated noise', 'Stated noise')} of {_mm(stated_m)} mm: the arm's own repeatability shows.</p>"
+            f"{term('stated noise', 'Stated noise')} of {two_digits(stated_m * 1e3)} mm: the arm's own "
+            "repeatability shows, if <b>Check</b> found the instrument as promised.</p>"
         )
     return block(text + _if_you_stop(so_far, tool_std_m), "verdict")
 
@@ -137,7 +141,7 @@ def undo_words(event: Event | None, state: State) -> str:
     return block(f"<p class='soft'>Undo takes back: {escape(event_words(event, state))}.</p>", "undo")
 
 
-def shot_words(shot: Shot | None, chosen: bool) -> str:
+def shot_words(shot: Shot | None, chosen: bool, state: State) -> str:
     """One shot: which, where, and what became of it."""
     if shot is None:
         return block("<p class='soft'>Nothing is measured yet.</p>", "shot")
@@ -147,7 +151,7 @@ def shot_words(shot: Shot | None, chosen: bool) -> str:
     fate = "measured again since" if shot.superseded_by is not None else escape(shot.verdict)
     which = "chosen" if chosen else "the last one; click a point in 3-D to choose another"
     return block(
-        f"<p><b>Record {shot.record}</b>, joint {taken.joint}, stop {taken.step + 1}, "
+        f"<p><b>Record {shot.record}</b>, joint {taken.joint}, {stop_words(taken, state)}, "
         f"target {escape(taken.target)}: {which}</p>"
         f"<p>{point}<br><b>{fate}</b>{reason}</p><p class='soft'>{shot.utc[:19].replace('T', ' ')} UTC"
         f"{', ' + escape(shot.by) if shot.by else ''}</p>",
@@ -214,7 +218,8 @@ def _expected(expected: Expected | None, aims: Sequence[str]) -> str:
 def _why(robot: Robot, step: Step) -> str:
     held = robot.coupling_from(step.joint)
     if held is None:
-        return f"Only joint {step.joint} moves, so the target draws an arc about its axis. "
+        path = "a line along" if robot.joints[step.joint - 1].slides else "an arc about"
+        return f"Only joint {step.joint} moves, so the target draws {path} its axis. "
     return (
         f"Joint {held.target} is commanded along by its nominal passive motion, so that its motor stands still; all "
         "other motors are held. "
@@ -273,8 +278,8 @@ def _table_row(row: SweepProgress, robot: Robot) -> str:
 
 def _state_of(row: SweepProgress) -> str:
     if row.finished:
-        return "<span class='ok'>✔ done</span>"
-    return "<b>▶ now</b>" if row.current else "<span class='soft'>to do</span>"
+        return "<span class='ok' title='done'>✔</span>"
+    return "<b title='now'>▶</b>" if row.current else ""
 
 
 def _beside(row: SweepProgress) -> str:
@@ -299,12 +304,12 @@ def _not_defined(so_far: SweepSoFar, slides: bool) -> str:
     )
 
 
-def _residuals(so_far: SweepSoFar, k: int) -> str:
+def _residuals(so_far: SweepSoFar, k: int, digits: int) -> str:
     fit = so_far.live.fit
     name = term("off the axis so far", "Axial, radial, tangential")
     if fit.sliding:
-        return f"<b>{fixed(np.hypot(fit.radial_m[k], fit.tangential_m[k]) * 1e3, 2)} mm</b> off the line so far"
-    axial, radial = (_signed(value[k] * 1e3) for value in (fit.axial_m, fit.radial_m))
+        return f"<b>{fixed(np.hypot(fit.radial_m[k], fit.tangential_m[k]) * 1e3, digits)} mm</b> off the line so far"
+    axial, radial = (_signed(value[k] * 1e3, digits) for value in (fit.axial_m, fit.radial_m))
     return f"axial <b>{axial} mm</b>, radial <b>{radial} mm</b> {name}"
 
 
@@ -320,17 +325,13 @@ def _if_you_stop(so_far: SweepSoFar, tool_std_m: float | None) -> str:
     return f"<p>If you stop now: {direction}, {where}.</p>"
 
 
-def _signed(value: float) -> str:
-    text = fixed(value, 2)
-    return text if value < 0 or float(text) == 0 else f"+{text}"
+def _signed(value: float, digits: int) -> str:
+    text = fixed(value, digits)
+    return text if value < 0 or not text.strip("0.") else f"+{text}"
 
 
 def _percent(chance: float) -> str:
     return "below 0.01 %" if chance < 1e-4 else f"{100 * chance:.2g} %"
-
-
-def _mm(value_m: float) -> str:
-    return f"{value_m * 1e3:.2f}" if value_m < 0.1 else f"{value_m * 1e3:.0f}"
 
 
 def _std(value: float) -> str:

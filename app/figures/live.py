@@ -15,6 +15,8 @@ SYMBOLS = {Verdict.KEEP: "circle", Verdict.DOUBTFUL: "diamond", Verdict.AGAIN: "
 def live_figure(live: LiveSweep, commanded: Array, joint: int, sliding: bool, width_px: int = 520) -> go.Figure:
     """Axial and radial residuals and the error of the drive (command less actual) against the commanded displacement.
 
+    A joint that slides draws a line: residuals stand across it, in two directions square to each other.
+
     Args:
         live: the sweep so far.
         commanded: commanded displacement of each shot, rad or m, (k,).
@@ -45,8 +47,6 @@ def _curves(live: LiveSweep, commanded: Array, scale: float, unit: str) -> list[
     fit = live.fit
     lag = commanded - commanded[0] - live.displacements.value
     lag = (lag - np.nanmean(lag)) * scale
-    return [
-        (fit.axial_m * 1e3, "axial [mm]"),
-        (fit.radial_m * 1e3, "radial [mm]"),
-        (lag, f"error [{unit}]"),
-    ]
+    names = ("across 1 [mm]", "across 2 [mm]") if fit.sliding else ("axial [mm]", "radial [mm]")
+    across = (fit.radial_m, fit.tangential_m) if fit.sliding else (fit.axial_m, fit.radial_m)
+    return [*((value * 1e3, name) for value, name in zip(across, names, strict=True)), (lag, f"error [{unit}]")]

@@ -34,7 +34,7 @@ def step_of(bench: Workbench, by_hand: bool = False) -> str:
 def verdict_of(bench: Workbench, joint: int) -> str:
     so_far = bench.known.so_far(joint, 1)
     slides = bool(bench.nominal.sliding[joint - 1])
-    return plain(verdict_words(so_far, slides, bench.known.tool_std_m(so_far), bench.state.instrument.sigma_m))
+    return plain(verdict_words(so_far, slides, bench.known.tool_std_m(so_far), bench.state))
 
 
 def plain(html: str) -> str:
@@ -104,6 +104,9 @@ def test_the_table_counts_and_can_be_clicked(bench):
     assert html.count("data-say=") == 6
     assert "data-say='sweep-6-1'" in html
     assert "1 skipped, 1 extra, 1 excluded" in plain(html)
+    assert "joint 6, an extra stop, target T1" in plain(shot_words(bench.state.shots[1], False, bench.state))
+    bench.decisions.undo()
+    assert "the shot of joint 6, an extra stop" in undo_words(bench.decisions.undo_event(), bench.state)
     assert "50°" in html
     assert "3.1°" in html
     assert "No sweep is planned" in sweeps_table((), bench.nominal)
@@ -115,6 +118,7 @@ def test_sliding_joints_are_told_in_millimetres(tmp_path):
         assert "220 mm" in sweeps_table(sweep_progress(bench.state), bench.nominal)
         bench.decisions.go_to(3, 1)
         assert "q3 = -110.000 mm" in step_of(bench)
+        assert "draws a line along its axis" in step_of(bench)
         for _ in range(3):
             bench.shooting.measure()
         assert "If you stop now: direction of axis 3 known to" in verdict_of(bench, 3)
@@ -147,7 +151,7 @@ def test_a_shot_is_told_against_the_axis_and_its_prediction(bench):
 
 
 def test_before_any_shot_it_says_what_to_press():
-    assert "Press Measure" in plain(verdict_words(None, False, None, None))
+    assert "Press Measure" in plain(verdict_words(None, False, None, State()))
 
 
 def test_undo_says_what_it_takes_back(bench):
@@ -195,6 +199,6 @@ def test_names_from_people_are_escaped(tmp_path):
             step_words(bench.state, bench.nominal, True, None),
             sweeps_table(sweep_progress(bench.state), bench.nominal),
             undo_words(bench.decisions.undo_event(), bench.state),
-            shot_words(bench.state.shots[0], True),
+            shot_words(bench.state.shots[0], True, bench.state),
         )
     assert not any("<img" in piece for piece in pieces)

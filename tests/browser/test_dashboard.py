@@ -131,7 +131,7 @@ def test_from_an_empty_cell_to_an_exported_report(page, dashboard):
     dashboard.acquire.choose(bench.state.shots[2].id)
     wait_for_text(page, "shot", "chosen")
     group(page, "Exclude")
-    page.get_by_role("alert").filter(has_text="choose one below").wait_for()
+    page.get_by_role("alert").filter(has_text="choose one, or write").wait_for()
     choose(page, "Reason", "wrong target")
     group(page, "Exclude")
     wait_for_text(page, "shot", "excluded")
