@@ -15,6 +15,7 @@ from types import SimpleNamespace
 import viser
 
 from app import keys
+from app.callbacks import guard_callbacks
 from app.cell_view import CellView
 from app.clicks import Ear
 from app.gap_tabs import GapTabs
@@ -58,6 +59,7 @@ class Dashboard:
         self.openers = Openers()
         self.server.on_client_disconnect(self._gone)
         guard_uploads(self.server, self.seat.may, self._refuse)
+        guard_callbacks(self.server, lambda client, sentence: self.say(client, sentence))
         self._dark = False
         self._draw_page()
         bench.on_change(self.refresh)

@@ -61,8 +61,8 @@ APP = """
     app.isolability_summary app.isolability_report
     app.comparison_report app.comparison_summary
     app.rigs app.ahead app.rigged_session app.shooting app.robot_runs app.typed_shots app.decisions app.solving
-    app.known_so_far app.sweep_progress app.workbench app.pose_bench app.beside app.jobs app.spots app.clicks
-    app.words app.table_2 app.cell_view
+    app.known_so_far app.sweep_progress app.workbench app.pose_bench app.beside app.jobs
+    app.callbacks app.log_file app.spots app.clicks app.words app.table_2 app.cell_view
     app.glossary app.keys app.uploads app.exports app.event_words app.measure_words app.cell_words app.solve_words
     app.review_words
     app.pose_view app.pose_words app.compensate_bench app.compensate_words app.compare_bench app.compare_words

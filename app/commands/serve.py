@@ -32,6 +32,7 @@ def run(arguments: argparse.Namespace) -> None:
         InputError: the session cannot be opened, or the address cannot be used.
     """
     from app.dashboard import Dashboard, run_until
+    from app.log_file import keep_log
     from app.workbench import Workbench
 
     dashboard = Dashboard(Workbench(_session(arguments)), arguments.host, arguments.port)
@@ -42,7 +43,9 @@ def run(arguments: argparse.Namespace) -> None:
             "Use it in a network that you trust.",
             file=sys.stderr,
         )
-    print(f"trueaxis dashboard: http://{arguments.host}:{dashboard.port}  (session {session.path})", flush=True)
+    log = keep_log(session.path.parent)
+    kept = f"session {session.path}" + ("" if log is None else f", log {log}")
+    print(f"trueaxis dashboard: http://{arguments.host}:{dashboard.port}  ({kept})", flush=True)
     stop = threading.Event()
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: stop.set())
