@@ -1,12 +1,15 @@
-"""How long a session of 5,000 shots takes to open, to undo in, to grow by one shot, and to be listed.
+"""How long a session of 5,000 shots takes to open, to undo in, to grow by one shot, to be listed, and to be drawn.
 
-Run by ``python -m tests.benchmarks.session_speed``.
+Run by ``python -m tests.benchmarks sessions``.
 """
 
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 
+from app.dashboard import Dashboard
+from app.workbench import Workbench
 from core.instruments import MeasureRequest
 from core.session import Session
 from core.session_campaign import to_campaign
@@ -70,9 +73,26 @@ def _rows(path: Path) -> list[tuple[str, float]]:
         rows.append(("undo, then a new shot", median_s(_both(session, shot), REPEATS)))
         rows.append(("next step", median_s(lambda: _position(session), REPEATS)))
         rows.append(("as a campaign", median_s(lambda: to_campaign(session.state), REPEATS)))
+    rows += _page(path)
     names = iter(range(1000))
     rows.append(("copy", median_s(lambda: copy_session(path, path.with_name(f"{next(names)}.copy")), REPEATS)))
     return rows
+
+
+def _page(path: Path) -> list[tuple[str, float]]:
+    """The same with the whole page drawn anew each time, as the server does it; what a browser takes is not in it."""
+    start = time.perf_counter()
+    dashboard = Dashboard(Workbench(Session.open(path)), port=0)
+    opened = time.perf_counter() - start
+    try:
+        decisions = dashboard.bench.decisions
+        return [
+            ("open the dashboard", opened),
+            ("undo, page drawn", median_s(decisions.undo, 2 * REPEATS)),
+            ("redo, page drawn", median_s(decisions.redo, REPEATS)),
+        ]
+    finally:
+        dashboard.stop()
 
 
 def _both(session: Session, shot: ShotTaken) -> Callable[[], None]:
@@ -87,7 +107,3 @@ def _position(session: Session) -> int | None:
     session.state.__dict__.pop("position", None)
     session.state.__dict__.pop("done", None)
     return session.state.position
-
-
-if __name__ == "__main__":
-    print(report())
