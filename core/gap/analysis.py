@@ -45,6 +45,8 @@ LEAST_FREEDOM = 12
 """Residuals that a fit leaves free; fewer say nothing of the noise."""
 BEYOND_STATEMENT = 6.0
 """Times the stated variance: a statement may be off by a factor of two."""
+ROW = 3
+"""Points of one target off one after the other, which chance hardly ever makes outliers."""
 CHANCE, LEAST_EXCESS = 3.5, 0.2
 """Standard deviations, and logarithm of a ratio of variances, beyond which repeats scatter less than residuals."""
 
@@ -309,6 +311,7 @@ def _learn(
     scale = 3 * noise.weight / np.trace(noise.covariance_m2, axis1=1, axis2=2)
     chosen = [problem.candidates[g] for g in everything.groups]
     better = sharpened(problem.sim, told, chosen, named_left, own, scale)
+    noise = _undoubted(noise, first, told.seen, chosen, better)
     if steps or noise.excess > 1:
         bare, _ = _left(problem, evidence, prior, given)
         for aim in (named_left, bare):
@@ -394,12 +397,12 @@ def _learned_noise(told: Doings, problem: Problem, spent: float, left: Array, fi
     variance = noise_found.robust_variance(standard[used]) * 3 * np.count_nonzero(used) / freedom
     covariance = _rescaled(covariance, variance)
     weight = first.weight.copy()
-    weight[_outlying(left, covariance, used)] = 0.0
+    weight[_outlying(told.seen, left, covariance, used)] = 0.0
     scatter = joint_scatter(problem.sim, told, left, whitening(covariance, (weight > 0).astype(float)))
     shaped = covariance if scatter is None else scatter.over(covariance)
     scaled = whitening(shaped, np.ones(len(left))).rows(left)
     memory = noise_found.memory(told, scaled, used)
-    outlying = _outlying(left, shaped, used)
+    outlying = _outlying(told.seen, left, shaped, used)
     weight = first.weight.copy()
     weight[outlying] = 0.0
     inlying = weight > 0
@@ -425,7 +428,37 @@ def _learned_noise(told: Doings, problem: Problem, spent: float, left: Array, fi
     )
 
 
-def _outlying(left_m: Array, covariance_m2: Array, used: np.ndarray) -> np.ndarray:
-    """Indices of points that are farther off than any noise, (k,)."""
+def _undoubted(
+    noise: NoiseFound, first: NoiseFound, seen: Observations, chosen: list[Candidate], better: list[Candidate]
+) -> NoiseFound:
+    """Points between a moment and the better one count again: they were off because of the wrong moment."""
+    between = np.zeros(seen.count, dtype=bool)
+    for new in better:
+        for old in chosen:
+            if new.place.record is not None and old.place.record is not None and new.place.same_as(old.place):
+                low, high = sorted((new.place.record, old.place.record))
+                between |= (seen.record >= low) & (seen.record <= high)
+    outliers = noise.outliers[~between[noise.outliers]]
+    return replace(noise, weight=np.where(between, first.weight, noise.weight), outliers=outliers)
+
+
+def _outlying(seen: Observations, left_m: Array, covariance_m2: Array, used: np.ndarray) -> np.ndarray:
+    """Indices of points that are farther off than any noise, (k,).
+
+    Outliers come alone: many in a row of one target are something that no candidate describes yet.
+    """
     scaled = whitening(covariance_m2, np.ones(len(left_m))).rows(left_m)
-    return np.flatnonzero(used & (np.abs(scaled).max(axis=1) > noise_found.OUTLYING))
+    off = used & (np.abs(scaled).max(axis=1) > noise_found.OUTLYING)
+    for target in np.unique(seen.target):
+        rows = np.flatnonzero(used & (seen.target == target))
+        off[rows] &= ~_in_a_row(off[rows], ROW)
+    return np.flatnonzero(off)
+
+
+def _in_a_row(marked: np.ndarray, count: int) -> np.ndarray:
+    """Those marked that stand in a row of at least so many."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
+    out = np.zeros(len(marked), dtype=bool)
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        out[first:end] = end - first >= count
+    return out

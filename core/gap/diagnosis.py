@@ -46,7 +46,7 @@ from core.measurements import Campaign
 UNKNOWN_PROBABILITY = 0.8
 """That something without a name acts at that joint or variable."""
 TOLD_SHARE = 0.01
-"""Of the gap: a change of geometry that closes less is fitted but not told."""
+"""Of the gap: a change of geometry that closes less, or a name that adds less to something unknown, is not told."""
 HOLD_OUT = "fifths of each arc and regions of the joint space, each predicted from the others"
 SURE_OF_REST = 0.1
 """What nameless functions must still close, as a share of the gap, to be told as something unknown."""
@@ -148,14 +148,25 @@ class Findings:
 
     @cached_property
     def stands(self) -> list[Stand]:
-        """Named causes, the one that the data say most for first, then unknown ones."""
+        """Named causes, the one that the data say most for first, and unknown ones."""
         judged = self._told_stands() if self.told else [*self._geometry_stands(), *stands(self.judge)]
         named = [one for one in judged if not one.unknown]
         order = sorted(named, key=lambda one: self._evidence_lost(one, named), reverse=True)
         order = [one for one in order if self.told or self._matters(one, order)]
         if self.told:
             return order
-        return [*order, *self._unknown([one for one in judged if one.unknown], order)]
+        return self._strongest_first(order, self._unknown([one for one in judged if one.unknown], order))
+
+    def _strongest_first(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
+        """Names in their order; before them what has no name and closes more than any: names must add to it then."""
+        everything = [*named, *unknown]
+        whole = self.judge.square(_chosen(everything))
+        lost = [self.judge.square(_chosen([o for o in everything if o is not one])) - whole for one in everything]
+        most = max(lost[: len(named)], default=np.inf)
+        first = [one for one, m2 in zip(unknown, lost[len(named) :], strict=True) if m2 > most]
+        if first:
+            named = [one for one, m2 in zip(named, lost, strict=False) if m2 > TOLD_SHARE * self.judge.closable_m2]
+        return [*first, *named, *(one for one in unknown if one not in first)]
 
     @cached_property
     def named(self) -> list[Stand]:
@@ -403,7 +414,7 @@ def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, 
     if stand.groups[0] in found.analysis.given.groups:
         # The geometry as a whole is settled by points kept out; this is about the one frame.
         return _significance(found, stand), (stand.place,)
-    probability, alike = twins(stand, rivals(found.judge, stand, joined(others, found.analysis.found.worth)))
+    probability, alike = twins(stand, rivals(found.judge, stand, joined(others, found.analysis.found.chosen)))
     if len(found.named) == len(found.stands):
         return probability, alike
     return probability * adequate(found.judge, _chosen(found.named), _chosen(found.stands)), alike

@@ -9,6 +9,7 @@ import numpy as np
 from core.gap.evidence import Chosen, joined, without
 from core.gap.open_set import LOCALLY, Judge, Stand
 from core.gap.result import Place
+from core.geometry import Array
 
 NO_CAUSE = Place("none")
 FORM_ERROR = 0.002
@@ -27,6 +28,7 @@ def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, floa
     score[np.isin(named, known.groups)] = -np.inf
     places: list[Place] = []
     best: list[float] = []
+    wide: list[int] = []
     for k in np.argsort(score)[::-1]:
         if not np.isfinite(score[k]):
             continue
@@ -34,13 +36,29 @@ def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, floa
         if not any(place.same_as(known) for known in places):
             places.append(place)
             best.append(float(score[k]))
+            wide.append(judge.problem.width(named[k]))
     # No cause at all is one more possibility, without evidence and without cost.
     places.append(NO_CAUSE)
     best.append(0.0)
-    odds = np.array(best) - max(best)
-    odds /= np.sqrt(1 + (FORM_ERROR * max(best)) ** 2)
-    weight = np.exp(odds)
-    return list(zip(places, weight / weight.sum(), strict=True))
+    wide.append(0)
+    weight = np.exp(_odds(np.array(best), np.array(wide), _index(places, stand.place)))
+    order = np.argsort(-weight, kind="stable")
+    return [(places[k], float(weight[k] / weight.sum())) for k in order]
+
+
+def _index(places: list[Place], place: Place) -> int:
+    return next((k for k, one in enumerate(places) if one.same_as(place)), 0)
+
+
+def _odds(evidence: Array, width: np.ndarray, mine: int) -> Array:
+    """Log odds of each place against the one that stands, which take the roughness of all forms into account.
+
+    A form that is free to do more and yet explains no more does not profit from that: what stands needs no repair.
+    """
+    odds = evidence - evidence[mine]
+    idle = (width > width[mine]) & (odds < 0)
+    odds = np.where(idle, odds, odds / np.sqrt(1 + (FORM_ERROR * evidence.max()) ** 2))
+    return odds - odds.max()
 
 
 def adequate(judge: Judge, named: Chosen, everything: Chosen) -> float:

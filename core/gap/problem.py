@@ -57,6 +57,10 @@ class Problem:
         """What having been chosen from several atoms costs each candidate in log evidence."""
         return np.log([candidate.choices for candidate in self.candidates])
 
+    def width(self, candidate: int) -> int:
+        """Number of columns of a candidate."""
+        return self.slices[candidate].stop - self.slices[candidate].start
+
     @property
     def named(self) -> np.ndarray:
         return np.array([k for k, c in enumerate(self.candidates) if c.named], dtype=int)

@@ -38,6 +38,8 @@ def sharpened(
         weight: of each point, 1/m^2, 0: left out, (m,).
     """
     out = []
+    # Points beside a moment that was missed look like outliers: they are what it is found by.
+    every = np.where(weight > 0, weight, weight.max())
     for candidate, own in zip(chosen, own_m, strict=True):
         place = candidate.place
         if drives.order_of(candidate) is not None:
@@ -45,10 +47,10 @@ def sharpened(
             near = [part for one, part in zip(chosen, own_m, strict=True) if _neighbours(doings, one, candidate)]
             out += _periodic(sim, doings, candidate, left_m + sum(near), weight)
         elif place.effect == "base_shift":
-            out.append(_shift(sim, doings, place.record, left_m + own, weight, None))
+            out.append(_shift(sim, doings, place.record, left_m + own, every, None))
         elif place.effect == "target_slip":
             names = [target.name for target in doings.seen.campaign.targets]
-            out.append(_shift(sim, doings, place.record, left_m + own, weight, names.index(place.target)))
+            out.append(_shift(sim, doings, place.record, left_m + own, every, names.index(place.target)))
     return out
 
 
@@ -254,7 +256,8 @@ def _shift(sim: Sim, doings: Doings, record: int | None, aim_m: Array, weight: A
     aim = aim_m * np.sqrt(weight)[:, None]
     squares = np.cumsum(np.einsum("mck,mcl->mkl", fields, fields)[::-1], axis=0)[::-1]
     pulls = np.cumsum(np.einsum("mck,mc->mk", fields, aim)[::-1], axis=0)[::-1]
-    starts = np.flatnonzero(np.append(True, np.diff(seen.standstill) != 0))[1:]
+    # What happened while nobody looked is told from the record on at which it was seen.
+    starts = (np.arange(seen.count) if target is None else np.flatnonzero(seen.target == target))[1:]
     near = np.abs(seen.record[starts] - record) <= np.ptp(seen.record) * 2.0 / instrument.MOMENTS
     starts = starts[near] if near.any() else starts
     # The part before the change is free as well: placement has already met both halves in the middle.

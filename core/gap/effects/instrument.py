@@ -4,6 +4,7 @@ import numpy as np
 
 from core.gap.doings import Doings
 from core.gap.effects.candidate import ANGLE, LENGTH, Candidate, Column
+from core.gap.observations import Observations
 from core.gap.result import Place
 from core.gap.sim import Part, Slot
 
@@ -42,11 +43,16 @@ def scales(doings: Doings) -> list[Candidate]:
 def moments(doings: Doings, of: np.ndarray | None = None) -> list[int]:
     """Records at which a change would show well enough to be looked for, first of a standstill each."""
     seen = doings.seen
-    keep = np.ones(seen.count, dtype=bool) if of is None else of
-    starts = np.flatnonzero(np.append(True, np.diff(seen.standstill) != 0) & keep)
+    starts = looks(seen, of)
     shares = np.linspace(EDGE, 1 - EDGE, MOMENTS)
     picked = np.unique((shares * len(starts)).astype(int))
     return [int(seen.record[starts[k]]) for k in picked if 0 < k < len(starts)]
+
+
+def looks(seen: Observations, of: np.ndarray | None = None) -> np.ndarray:
+    """The first of the points that are looked at in each standstill: what happened before is seen there."""
+    rows = np.arange(seen.count) if of is None else np.flatnonzero(of)
+    return rows[np.append(True, np.diff(seen.standstill[rows]) != 0)]
 
 
 def base_shift(record: int, choices: int) -> Candidate:

@@ -5,12 +5,15 @@ import numpy as np
 from core.gap.doings import Doings
 from core.gap.effects.candidate import ANGLE, Candidate, Column, drive, motors, unit
 from core.gap.result import Place
+from core.geometry import Array
 
 FRICTION_SHARES = (0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9)
 """Of the largest load: below it friction holds the joint behind its motor, above it gravity decides."""
 BUILD_UP_RAD, BUILD_UP_M = (0.05, 0.15, 0.5), (0.005, 0.015, 0.05)
 LEAST_LOAD = 0.1
 """Loads below this turn nothing, N m or N."""
+BEGAN = "at_rest_before_it_first_moved"
+"""Where in its play a joint stood when the campaign began, nobody knows."""
 
 
 def backlashes(doings: Doings) -> list[Candidate]:
@@ -33,21 +36,27 @@ def hystereses(doings: Doings) -> list[Candidate]:
 
 
 def _backlash(doings: Doings, joint: int, friction: float, choices: int) -> Candidate:
+    def side(doings: Doings) -> Array:
+        return -doings.sense[:, joint] if np.isinf(friction) else doings.past.flank(joint, friction)
+
+    began = bool((side(doings) == 0).any())
+
     def columns(doings: Doings) -> list[Column]:
-        if np.isinf(friction):
-            return [drive(doings, joint, -doings.sense[:, joint] / 2)]
-        return [drive(doings, joint, doings.past.flank(joint, friction) / 2)]
+        which = side(doings)
+        return [drive(doings, joint, one) for one in (which / 2, (which == 0).astype(float))[: 1 + began]]
 
     of = unit(doings, joint)
     load = "N" if of == "m" else "N m"
     atom = "taken up by the motor" if np.isinf(friction) else f"taken up by loads above {friction:.3g} {load}"
-    return Candidate(Place("backlash", joint=joint + 1), atom, (f"gap_{of}",), columns, choices, (ANGLE,))
+    names = (f"gap_{of}", f"{BEGAN}_{of}")[: 1 + began]
+    return Candidate(Place("backlash", joint=joint + 1), atom, names, columns, choices, (ANGLE,) * len(names))
 
 
 def _hysteresis(doings: Doings, joint: int) -> Candidate:
     of = unit(doings, joint)
     ways = BUILD_UP_M if of == "m" else BUILD_UP_RAD
     heavy = 0.0 if doings.drive_load is None else float(np.abs(doings.drive_load[:, joint]).max())
+    began = bool((doings.sense[:, joint] == 0).any())
 
     def columns(doings: Doings) -> list[Column]:
         sense, travel = doings.sense[:, joint], doings.travel[:, joint]
@@ -55,9 +64,10 @@ def _hysteresis(doings: Doings, joint: int) -> Candidate:
         out += [drive(doings, joint, -sense / 2 * np.exp(-travel / way)) for way in ways]
         if heavy > LEAST_LOAD and doings.drive_load is not None:
             out.append(drive(doings, joint, -sense / 2 * np.abs(doings.drive_load[:, joint]) / heavy))
-        return out
+        return [*out, drive(doings, joint, (sense == 0).astype(float))] if began else out
 
     names = [f"loss_{of}"] + [f"not_yet_after_{1e3 * way:g}_{'mm' if of == 'm' else 'mrad'}_{of}" for way in ways]
     if heavy > LEAST_LOAD:
         names.append(f"with_load_{of}")
+    names += [f"{BEGAN}_{of}"] * began
     return Candidate(Place("hysteresis", joint=joint + 1), "", tuple(names), columns, 1, (ANGLE,) * len(names))
