@@ -31,6 +31,8 @@ GHOST_SWELL_M = 0.01
 """The ghost is that much thicker, so that it does not flicker with the arm inside it."""
 SEEN_MOVING_M = 1e-3
 """A base that is found elsewhere by less than this stays where it is drawn."""
+MEASURED = ("points", "circle", "errors", "stations")
+"""What stands out of the way of the geometry against design."""
 FAR = 0.3
 """Share of the arm's reach by which it moves out of the picture."""
 
@@ -54,6 +56,7 @@ class CellView:
         self._axes: AxesView | None = None
         self._diagnosis: DiagnosisView | None = None
         self._diagnosed = False
+        self._put_away: tuple[str, ...] = ()
         self._exaggeration = 20.0
         self._moving = threading.Lock()
         self.commanded: tuple[float, ...] = self._bench.robot.commanded
@@ -217,6 +220,7 @@ class CellView:
         if self.drawn is None:
             return
         self.drawn = None
+        self._clear_for_diagnosis(False)
         if self._axes is not None:
             self._axes.remove()
             self._axes = None
@@ -252,9 +256,20 @@ class CellView:
             self._diagnosis.visible = wanted
             self.light(None)
         shown = wanted and self._diagnosis is not None
+        self._clear_for_diagnosis(shown)
         self.arm.opacity = 0.2 if shown else None
         if self._axes is not None:
             self._axes.visible = not shown
+
+    def _clear_for_diagnosis(self, shown: bool) -> None:
+        """While differences are shown, what was measured stands out of their way."""
+        if shown == bool(self._put_away):
+            return
+        if shown:
+            self._put_away = tuple(name for name in MEASURED if getattr(self, name).visible)
+        for name in self._put_away:
+            getattr(self, name).visible = not shown
+        self._put_away = self._put_away if shown else ()
 
     def light(self, spot: Spot | None) -> None:
         """Draw what a result speaks of in the colour of attention: a dimension, or the axis of a joint; None: none."""

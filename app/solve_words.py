@@ -1,5 +1,6 @@
 """Small pieces of HTML about a solution. Whatever comes from people or files is escaped here."""
 
+import re
 from html import escape
 
 from app.glossary import term
@@ -11,6 +12,7 @@ from core.solve_figures import Change
 from core.wording import fixed
 
 MOST_CHANGES, MOST_REJECTIONS = 6, 8
+NAMES = {"a": "a", "b": "b", "alpha": "α", "theta": "θ"}
 
 
 def summary_words(found: Calibration, limits: Limits, changes: tuple[Change, ...], since: int) -> str:
@@ -93,13 +95,19 @@ def _changes(changes: tuple[Change, ...]) -> str:
 
 
 def _change(change: Change) -> str:
-    name = escape(change.name)
+    name = _name(change.name)
     if change.before is None:
         return f"{name} is known now: {_value(change.after, change.unit)}"
     if change.after is None:
         return f"{name} is no longer known"
     moved = "" if change.in_std == float("inf") else f" ({change.in_std:.1f} u)"
     return f"{name}: {_value(change.before, change.unit)} → {_value(change.after, change.unit)}{moved}"
+
+
+def _name(name: str) -> str:
+    """``alpha2`` as the tables have it, α₂; other names as they are."""
+    found = re.fullmatch(r"(a|b|alpha|theta)(\d+)", name)
+    return f"{NAMES[found[1]]}<sub>{found[2]}</sub>" if found else escape(name)
 
 
 def _value(value: str | float | None, unit: str) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.cell_view import CellView
 from app.scene.cameras import fly_to
-from app.scene.colours import hex_of
+from app.scene.colours import BLUE, FITTED_AXIS, NOMINAL_AXIS, VERMILLION, hex_of
 from app.spots import Spot
 from app.words import block
 
@@ -18,6 +18,16 @@ if TYPE_CHECKING:
 MAGNIFICATION = (10, 1000, 10)
 EXAGGERATION = (1, 500, 1)
 """Least, most and step of how many times too large residuals and differences are drawn."""
+DIFFERENCES = (
+    "<h3>Geometry against design</h3>"
+    f"<p><span style='color:{hex_of(NOMINAL_AXIS)}'>⬤</span> axes as designed&emsp;"
+    f"<span style='color:{hex_of(FITTED_AXIS)}'>⬤</span> as they are&emsp;"
+    f"<span style='color:{hex_of(BLUE)}'>⬤</span> Z<sub>φ</sub> of the phi-frames&emsp;"
+    f"<span style='color:{hex_of(VERMILLION)}'>⬤</span> significant differences</p>"
+    "<p class='soft'>Every link is drawn from where its design begins, so that each shows its own error alone. An "
+    "arrow leads from the design to what is there, as many times too large as is written above it; its label has the "
+    "true value with its standard uncertainty. Click a finding or a row of the table to come close.</p>"
+)
 JOINT = "Joint "
 """Before the number of a joint in the name of its view."""
 WIDEST = 720.0
@@ -53,7 +63,7 @@ class ViewPanel:
         self._dark = gui.add_checkbox("Dark theme", False)
         self._obey(self._ghost, lambda: setattr(cell.ghost, "visible", bool(self._ghost.value)))
         self._obey(self._errors, lambda: setattr(cell.errors, "visible", bool(self._errors.value)))
-        self._obey(self._geometry, lambda: cell.diagnose(bool(self._geometry.value)))
+        self._obey(self._geometry, self._diagnose)
         self._obey(self._dark, lambda: on_dark(bool(self._dark.value)))
         self._legend = gui.add_html("")
         with gui.add_folder("Pose that is drawn", expand_by_default=False):
@@ -79,6 +89,8 @@ class ViewPanel:
                 "<p class='soft'>Tubes about the axes: one standard uncertainty, drawn "
                 f"{self._cell.tube_exaggeration:g} times too wide.</p>"
             )
+        if self._cell.drawn is not None and self._geometry.value:
+            words = DIFFERENCES
         self._legend.content = block(words, "legend")
         self._swell.value = int(self._cell.exaggeration)
         for slider, value, scale in zip(self._sliders, self._cell.commanded, self._scales, strict=True):
@@ -121,6 +133,10 @@ class ViewPanel:
         camera = next((c for c in self._cell.cameras() if c.name == name), None)
         if camera is not None and event.client is not None:
             fly_to(event.client, camera)
+
+    def _diagnose(self) -> None:
+        self._cell.diagnose(bool(self._geometry.value))
+        self.refresh()
 
     def _enlarge(self) -> None:
         self._cell.exaggeration = _within(self._swell)

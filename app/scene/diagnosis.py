@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from app.scene.cameras import UP, Camera, around, near
+from app.scene.cameras import FIELD_OF_VIEW_RAD, Camera, around, near
 from app.scene.colours import BLUE, FITTED_AXIS, GREY, HIGHLIGHT, NOMINAL_AXIS, VERMILLION, Rgb
 from app.scene.dimensions import Dimension, FrameSketch, dimensions, sketches
 from app.scene.error_vectors import factor_text
 from app.scene.group import SceneGroup, Viewer, add_solid
+from app.scene.picture import picture_directions
 from app.scene.solids import Solid, arrow, ball, merged
 from core.estimate import Geometry
 from core.geometry import Array, cross
@@ -17,6 +18,14 @@ from core.phi_model import PhiModel
 
 if TYPE_CHECKING:
     import viser
+
+
+LABEL_PX, LINE_PX, NARROWEST_PX, NARROWEST = 215.0, 25.0, 428.0, 428.0 / 768.0
+"""Width of a label and height of a line, and the picture between the panels on the smallest screen."""
+MOST_ROUNDS = 400
+"""Of moving labels apart."""
+SLACK = 1.15
+"""Labels are kept that much further apart, because the view of them all is from a little further away."""
 
 
 class DiagnosisView(SceneGroup):
@@ -80,10 +89,7 @@ class DiagnosisView(SceneGroup):
 
     def overview(self) -> Camera:
         """A view that holds all differences with their labels."""
-        corners = [self._models[2][:3, 3], *(p for d in self.dimensions for p in (d.from_m, d.to_m))]
-        pad = 0.06 * self._reach * np.array([1.0, 1.0, 1.0])
-        points = np.vstack([np.array(corners), self._places()])
-        return around("Geometric errors", np.vstack([points - pad, points + pad]), self.direction, 1.1)
+        return around("Geometric errors", np.vstack([self._corners(), self._places()]), self.direction, 1.1)
 
     def camera(self, frame: int, parameter: str) -> Camera:
         """A close view of one dimension.
@@ -96,6 +102,12 @@ class DiagnosisView(SceneGroup):
                 size = max(0.22 * self._reach, 1.4 * float(np.linalg.norm(d.to_m - d.from_m)))
                 return near(d.text, d.middle_m, self.direction, size)
         raise KeyError(f"frame {frame} has no dimension {parameter}")
+
+    def _corners(self) -> Array:
+        """What a view of all differences must hold, without labels, (k, 3)."""
+        corners = [self._models[2][:3, 3], *(p for d in self.dimensions for p in (d.from_m, d.to_m))]
+        pad = 0.06 * self._reach
+        return np.vstack([np.array(corners) - pad, np.array(corners) + pad])
 
     def _draw(self) -> None:
         drawn = sketches(*self._models, self._exaggeration)
@@ -139,9 +151,12 @@ class DiagnosisView(SceneGroup):
     def _draw_dimensions(self) -> None:
         places = self._places()
         leaders = []
-        for d, place in zip(self.dimensions, places, strict=True):
+        over = picture_directions(self.direction)[1]
+        for d, stacked in zip(self.dimensions, places, strict=True):
             key = (d.frame, d.parameter)
             lit = key == self._lit
+            # One alone has its label close by, so that both are seen from near.
+            place = d.middle_m + 0.07 * self._reach * over if lit else stacked
             name = f"dimensions/{d.frame}_{d.parameter}"
             self._mesh(name, self._leg(d, lit), self._colour(d, lit))
             shown = lit or (d.significant and self._lit is None)
@@ -153,7 +168,12 @@ class DiagnosisView(SceneGroup):
         )
 
     def _places(self) -> Array:
-        return label_places(self.dimensions, 0.075 * self._reach, 0.45 * self._reach, self.direction)
+        eye = around("Geometric errors", self._corners(), self.direction, 1.1).fitting(NARROWEST)
+        width = 2 * NARROWEST * np.tan(FIELD_OF_VIEW_RAD / 2) * float(np.linalg.norm(eye.position_m - eye.look_at_m))
+        pixel = SLACK * width / NARROWEST_PX
+        return label_places(
+            self.dimensions, LINE_PX * pixel, LABEL_PX * pixel, self.direction, (eye.look_at_m, width / 2)
+        )
 
     def _colour(self, dimension: Dimension, lit: bool) -> Rgb:
         if lit:
@@ -173,32 +193,49 @@ class DiagnosisView(SceneGroup):
         add_solid(self._scene, f"{self._root}/{name}", solid, colour)
 
 
-def label_places(drawn: tuple[Dimension, ...], height_m: float, width_m: float, direction: Array) -> Array:
+def label_places(
+    drawn: tuple[Dimension, ...],
+    height_m: float,
+    width_m: float,
+    direction: Array,
+    room: tuple[Array, float] | None = None,
+) -> Array:
     """Places for labels near their dimensions, (k, 3), one above the other where they would overlap.
+
+    All stand in one plane square to the view, so that what is apart there is apart in the picture.
 
     Args:
         drawn: the dimensions; labels of those that are not significant stay where they are.
         height_m: way up the picture from one label to the next.
         width_m: labels this far apart or further across the picture do not overlap.
         direction: from the arm to the eye, (3,).
+        room: middle of the picture, (3,), and half its width, m, in which whole labels are kept; None: endless.
     """
     if not drawn:
         return np.zeros((0, 3))
-    right = cross(UP, direction)
-    right = right / np.linalg.norm(right)
-    over = cross(direction / np.linalg.norm(direction), right)
-    # A little above, so that a label does not cover what it speaks of.
-    places = np.array([d.middle_m for d in drawn]) + 0.8 * height_m * over
+    right, over = picture_directions(direction)
+    middles = np.array([d.middle_m for d in drawn])
     shown = np.array([d.significant for d in drawn])
-    across, up = places @ right, places @ over
+    # A little above, so that a label does not cover what it speaks of.
+    across, up = middles @ right, middles @ over + 0.8 * height_m
+    if room is not None:
+        aside = max(room[1] - width_m / 2, 0.0)
+        across = np.clip(across, room[0] @ right - aside, room[0] @ right + aside)
+    moved = _stacked(across, up, shown, height_m, width_m)
+    away = cross(right, over)
+    return across[:, None] * right + moved[:, None] * over + (middles @ away).mean() * away
+
+
+def _stacked(across: Array, up: Array, shown: np.ndarray, height_m: float, width_m: float) -> Array:
+    """Heights of labels in the picture, (k,), moved apart where those that are shown would overlap."""
     rivals = (np.abs(across[:, None] - across) < width_m) & shown[:, None] & shown
     np.fill_diagonal(rivals, False)
     order = np.argsort(np.argsort(up, kind="stable"))
     above = np.where(order[:, None] > order, 1.0, -1.0)
     moved = up.copy()
-    for _ in range(200):
+    for _ in range(MOST_ROUNDS):
         lacking = np.where(rivals, np.clip(height_m - (moved[:, None] - moved) * above, 0.0, None), 0.0)
         if lacking.max() < 1e-3 * height_m:
             break
         moved = moved + 0.25 * (lacking * above).sum(axis=1)
-    return places + (moved - up)[:, None] * over
+    return moved

@@ -22,8 +22,14 @@ from core.phi_model import PARAMETERS, PhiModel, frames
 from core.phi_transforms import link_transform, phi_transform
 from core.wording import decimals_for, fixed, parameter_unit
 
-WORDS = {"a_m": "offset a", "b_m": "distance b", "alpha_rad": "angle \N{GREEK SMALL LETTER ALPHA}"}
-WORDS["theta_rad"] = "angle \N{GREEK SMALL LETTER THETA}"
+SIGNS = {
+    "a_m": "a",
+    "b_m": "b",
+    "alpha_rad": "\N{GREEK SMALL LETTER ALPHA}",
+    "theta_rad": "\N{GREEK SMALL LETTER THETA}",
+}
+NOTHING_M = 1e-6
+"""A length that is designed shorter than this is none."""
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 LARGEST_ANGLE_RAD = np.deg2rad(75.0)
 """No exaggerated angle is drawn larger: beyond it one could no longer tell which way an axis leans."""
@@ -45,7 +51,7 @@ class Dimension:
     """Actual minus nominal, m or rad, as it is."""
     std: float
     text: str
-    """The deviation with its uncertainty: offset a₂ −3.10 ± 0.22 mm."""
+    """What it means, and the deviation with its uncertainty: link 2 too long: a₂ −3.10 ± 0.22 mm."""
     significant: bool
 
     @property
@@ -89,7 +95,8 @@ def dimensions(
         for k, name in enumerate(PARAMETERS):
             if geometry.std[i, k] > 0:
                 ends = corners[k]
-                out.append(_dimension(i + 1, name, ends, float(deviation[k]), float(geometry.std[i, k])))
+                what = meaning(i + 1, name, float(nominal.parameters[i, k]), float(deviation[k]))
+                out.append(_dimension(i + 1, name, ends, float(deviation[k]), float(geometry.std[i, k]), what))
     return out
 
 
@@ -119,6 +126,15 @@ def sketches(nominal: PhiModel, geometry: Geometry, base: Array, exaggeration: f
             )
         )
     return out
+
+
+def meaning(frame: int, parameter: str, nominal: float, deviation: float) -> str:
+    """What a deviation, m or rad, means: which link is long or short, or which axis is shifted or leans."""
+    if not parameter.endswith("_m"):
+        return f"axis {frame + 1} leans"
+    if abs(nominal) < NOTHING_M:
+        return f"axis {frame + 1} shifted"
+    return f"link {frame} too {'long' if nominal * deviation > 0 else 'short'}"
 
 
 def fitting_exaggeration(nominal: PhiModel, geometry: Geometry, reach_m: float) -> float:
@@ -157,11 +173,13 @@ def _corners(
     return [(places[0], places[1]), (places[1], places[2]), (tips[0], tips[1]), (tips[1], tips[2])]
 
 
-def _dimension(frame: int, parameter: str, ends: tuple[Array, Array], deviation: float, std: float) -> Dimension:
+def _dimension(
+    frame: int, parameter: str, ends: tuple[Array, Array], deviation: float, std: float, what: str
+) -> Dimension:
     unit, scale = parameter_unit(parameter)
     decimals = decimals_for(std * scale)
     sign = "+" if deviation >= 0 else ""
     value = f"{sign}{fixed(deviation * scale, decimals)} ± {fixed(std * scale, decimals)}"
-    name = f"{WORDS[parameter]}{str(frame).translate(SUBSCRIPTS)}"
-    text = f"{name} {value}{'°' if unit == 'deg' else f' {unit}'}"
+    name = f"{SIGNS[parameter]}{str(frame).translate(SUBSCRIPTS)}"
+    text = f"{what}: {name} {value}{'°' if unit == 'deg' else f' {unit}'}"
     return Dimension(frame, parameter, *ends, deviation, std, text, bool(abs(deviation) > SIGNIFICANT * std))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.scene.diagnosis import label_places
-from app.scene.dimensions import LARGEST_ANGLE_RAD, dimensions, fitting_exaggeration, sketches
+from app.scene.dimensions import LARGEST_ANGLE_RAD, dimensions, fitting_exaggeration, meaning, sketches
 from core.estimate import Geometry
 from core.phi_model import PARAMETERS, frames
 from core.phi_transforms import link_transform, phi_transform
@@ -28,11 +28,19 @@ def test_what_is_fixed_by_agreement_has_no_dimension() -> None:
 def test_deviation_std_text_and_significance() -> None:
     d = found()[2, "a_m"]
     assert d.deviation == pytest.approx(-3.1e-3)
-    assert d.text == "offset a₂ −3.10 ± 0.20 mm"
+    assert d.text == "link 2 too long: a₂ −3.10 ± 0.20 mm"
     assert d.significant
-    assert found()[2, "alpha_rad"].text == "angle α₂ −0.1720 ± 0.0057°"
-    assert found()[3, "theta_rad"].text == "angle θ₃ +0.010 ± 0.011°"
+    assert found()[2, "alpha_rad"].text == "axis 3 leans: α₂ −0.1720 ± 0.0057°"
+    assert found()[3, "theta_rad"].text == "axis 4 leans: θ₃ +0.010 ± 0.011°"
     assert not found()[3, "theta_rad"].significant
+
+
+def test_a_deviation_says_what_it_means() -> None:
+    assert meaning(2, "a_m", -0.69, -0.003) == "link 2 too long"
+    assert meaning(2, "a_m", -0.69, 0.003) == "link 2 too short"
+    assert meaning(3, "a_m", 0.67, 0.003) == "link 3 too long"
+    assert meaning(2, "b_m", 0.0, 0.003) == "axis 3 shifted"
+    assert meaning(5, "theta_rad", 0.0, 0.003) == "axis 6 leans"
 
 
 @pytest.mark.parametrize("frame", range(2, 6))
@@ -107,4 +115,7 @@ def test_labels_that_are_shown_do_not_overlap() -> None:
     for k, one in enumerate(shown):
         for other in shown[k + 1 :]:
             assert abs((one - other) @ right) >= 0.7 or abs((one - other) @ over) > 0.09
+    room = (np.mean([d.middle_m for d in drawn], axis=0), 0.5)
+    within = label_places(drawn, 0.1, 0.7, np.array([0.8, -0.3, 0.4]), room)
+    assert np.abs((within - room[0]) @ right).max() <= 0.15 + 1e-12
     assert np.array_equal(label_places((), 0.1, 0.7, np.array([1.0, 0, 0])), np.zeros((0, 3)))

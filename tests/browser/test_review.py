@@ -274,3 +274,31 @@ def test_the_first_view_is_fitted_to_the_picture(page, dashboard):
     arm = next(c for c in dashboard.cell.cameras() if c.name == "Arm")
     assert client_of(dashboard).camera.aspect < 0.7
     until(lambda: stands_at(client_of(dashboard), arm))
+
+
+def test_differences_are_told_apart_on_a_small_screen(page, dashboard):
+    page.set_viewport_size({"width": 1366, "height": 768})
+    tab(page, "Geometry")
+    for _ in range(2):
+        page.locator("[data-say='2-b_m']").last.click()
+        page.wait_for_timeout(1500)
+    client, drawn = client_of(dashboard), dashboard.cell._diagnosis
+    until(lambda: stands_at(client, drawn.overview()))
+    assert not dashboard.cell.points.visible
+    page.wait_for_timeout(500)
+    width, height = page.evaluate("() => [__viserMutable.canvas.clientWidth, __viserMutable.canvas.clientHeight]")
+    boxes = []
+    for label in (one for one in drawn._labels.values() if one.visible):
+        x, y = page.evaluate(SEEN_AT, ["/diagnosis", [float(v) for v in label.position]])
+        half = 3.3 * len(label.text)
+        boxes.append(((x + 1) / 2 * width, (1 - y) / 2 * height, half, label.text))
+    assert len(boxes) >= 4
+    for k, (x, y, half, text) in enumerate(boxes):
+        assert half < x < width - half, text
+        assert 10 < y < height - 10, text
+        assert all(abs(x - u) > half + other or abs(y - v) > 18 for u, v, other, _ in boxes[:k]), text
+    tab(page, "View")
+    wait_for_text(page, "legend", "axes as designed")
+    page.get_by_label("Geometry against design", exact=True).filter(visible=True).uncheck()
+    until(lambda: dashboard.cell.points.visible)
+    wait_for_text(page, "legend", "Radial residual")
