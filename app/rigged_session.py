@@ -26,7 +26,8 @@ class RiggedSession:
         """``cell`` is a simulated cell that the session may be of, beside the built-in ones."""
         self.session = session
         self.alone = threading.Lock()
-        """Held by whoever measures, or writes what was measured: one at a time."""
+        """Held by whoever measures, writes what was measured, or solves: one at a time."""
+        self._telling = threading.RLock()
         self._cell, self._seed = cell, seed
         self._listeners: list[Callable[[], None]] = []
         self._set_up()
@@ -62,10 +63,11 @@ class RiggedSession:
 
     def changed(self) -> None:
         """Tell all listeners; robot and instrument are set up anew first if the session says otherwise than before."""
-        if key_of(self.state, self._cell) != self._key:
-            self._set_up()
-        for listener in self._listeners:
-            listener()
+        with self._telling:
+            if key_of(self.state, self._cell) != self._key:
+                self._set_up()
+            for listener in self._listeners:
+                listener()
 
     def exchange(self, session: Session) -> None:
         """Put another session in the place of this one, which is closed; nobody is told yet."""

@@ -22,16 +22,17 @@ class Solving:
         self.calibration: Calibration | None = None
 
     def solve(self, by: str | None = None) -> Calibration:
-        """Calibrate from the shots that count.
+        """Calibrate from the shots that count; meanwhile no shot is taken, so that the solution is of all there are.
 
         Raises:
             TrueaxisError: the shots do not allow it; the sentence says why.
         """
-        found = self._ahead.solution(to_campaign(self._work.state))
-        digest = hashlib.sha256(calibration_to_json(found).encode()).hexdigest()
-        solved = Solved(digest, len(found.refinement.residuals.row), VERSION, figures_of(found))
-        self._work.session.append(solved, by)
-        self.calibration = found
+        with self._work.alone:
+            found = self._ahead.solution(to_campaign(self._work.state))
+            digest = hashlib.sha256(calibration_to_json(found).encode()).hexdigest()
+            solved = Solved(digest, len(found.refinement.residuals.row), VERSION, figures_of(found))
+            self._work.session.append(solved, by)
+            self.calibration = found
         self._work.changed()
         return found
 

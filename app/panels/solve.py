@@ -47,7 +47,7 @@ class SolvePanel:
             self._families = self._build_families(gui)
 
     def solve(self, event: object) -> None:
-        """Calibrate from what is there."""
+        """Calibrate from what is there; while the robot runs, between two of its shots."""
 
         def job(client: object) -> None:
             self._busy.content = block("<p class='soft'>Solving …</p>", "solving")
@@ -56,7 +56,7 @@ class SolvePanel:
             finally:
                 self._busy.content = ""
 
-        self._ask(event, job)
+        self._ask(event, job, at_once=self._bench.runs.running is not None)
 
     def refresh(self) -> None:
         """Show the last solution, if there is one."""

@@ -1,4 +1,4 @@
-"""A running dashboard, without a browser, while a diagnosis is made: who measures or solves does not wait for it."""
+"""A running dashboard, without a browser, at long work: neither Measure nor Solve waits for it."""
 
 import time
 from types import SimpleNamespace
@@ -52,6 +52,30 @@ def test_measuring_and_solving_do_not_wait_for_a_diagnosis_and_stop_ends_it(dash
     until(lambda: not panel._bar.visible)
     assert not panel._stop.visible
     assert dashboard.gap._gaps.found is None
+
+
+def test_solving_does_not_wait_for_the_robot_to_finish_and_the_solution_is_of_all_shots_before_it(tmp_path):
+    session = Session.create(tmp_path / f"run{SUFFIX}", demo_events(irb_l6.cell()), by="A. Operator")
+    dashboard = Dashboard(Workbench(session), port=0)
+    bench = dashboard.bench
+    bench.robot._seconds = 0.02
+    try:
+        dashboard.acquire._start(None, True)
+        until(lambda: len(bench.state.shots) > 20)
+        dashboard.solve.solve(None)
+        assert bench.calibration is not None
+        assert bench.runs.running
+        (entry,) = [entry for entry in session.entries if entry.kind == "solved"]
+        before = [one for one in session.entries if one.kind == "shot" and one.seq < entry.seq]
+        assert entry.event.shots == len(before)
+        assert bench.calibration.campaign.measurements.count == len(before)
+        until(lambda: len(bench.state.shots) > len(before) + 3)
+        assert bench.solving.since_solved >= 3
+        dashboard.acquire.stop(None)
+        dashboard.jobs.wait()
+        assert bench.runs.running is None
+    finally:
+        dashboard.stop()
 
 
 def test_a_diagnosis_ends_with_its_tab(dashboard):
