@@ -1,4 +1,4 @@
-"""``python -m tests.benchmarks.isolability``: what plans promised of diagnoses, against diagnoses of simulated campaigns.
+"""``python -m tests.benchmarks.isolability``: what plans promised, against diagnoses of simulated campaigns.
 
 Simulated arms as drawn, one effect each time at one place: at the limit that was promised for it, at a third of it, and
 at the size at which its rivals were named.

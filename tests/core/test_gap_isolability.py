@@ -18,11 +18,12 @@ from core.gap.expected_evidence import columns_of, expected_evidence, granting, 
 from core.gap.isolability import APART, Isolability, Isolated, isolability
 from core.gap.isolability_field import STATED, one_quantity
 from core.gap.isolability_json import isolability_record
-from core.gap.planned import planned_problem, untested, with_expected_points
+from core.gap.planned import as_planned, planned_problem, untested, with_expected_points
+from core.gap.planned import with_noise as with_expected_noise
 from core.gap.problem import Problem
 from core.gap.result import Place, Verdict
 from core.json_values import json_text
-from core.measurements import SWEEP, Campaign, Measurements
+from core.measurements import SWEEP, Campaign, Instrument, Measurements
 
 NOISE_M = float(np.hypot(2e-5, 1e-5 / np.sqrt(8 / np.pi)))
 """Of the crane: instrument and repeatability."""
@@ -287,6 +288,25 @@ class TestPlaces:
         campaign = random_sim(phi_arm(8), 8).seen.campaign
         with pytest.raises(CampaignError, match="target 'A' has no place on its link"):
             with_expected_points(campaign, np.eye(4))
+
+    def test_measured_points_give_way_to_expected_ones_of_the_placed_sim(self) -> None:
+        sim = random_sim(phi_arm(8), 8, count=60)
+        rows = sim.seen.campaign.measurements
+        partly = np.where(np.arange(60)[:, None] < 50, rows.point_m, np.nan)
+        found = as_planned(replace(sim.seen.campaign, measurements=replace(rows, point_m=partly)))
+        np.testing.assert_allclose(found.measurements.point_m, sim.points_m(), atol=1e-7)
+        assert all(target.sigma_m == np.inf for target in found.targets)
+
+    def test_noise_is_as_stated_or_as_given_and_has_to_be_known(self) -> None:
+        stated = PLANS["whole"]()
+        for sigma_m, repeats_m, expected in ((None, None, NOISE_M), (3e-5, 4e-5, 5e-5)):
+            found = with_expected_noise(stated, sigma_m, repeats_m).measurements.covariance_m2
+            np.testing.assert_allclose(found, np.broadcast_to(expected**2 * np.eye(3), found.shape), rtol=1e-9)
+        silent = replace(stated, instrument=Instrument("other"))
+        rows = silent.measurements
+        silent = replace(silent, measurements=replace(rows, covariance_m2=np.full_like(rows.covariance_m2, np.nan)))
+        with pytest.raises(CampaignError, match="does not state how exact its points will be"):
+            with_expected_noise(silent, None, 1e-5)
 
     def test_what_cannot_be_asked_is_said(self) -> None:
         campaign = PLANS["whole"]()
