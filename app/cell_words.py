@@ -1,7 +1,9 @@
 """Small pieces of HTML about the cell and its sessions. Whatever comes from people or files is escaped here."""
 
 from html import escape
+from zlib import crc32
 
+from app.clicks import listening, saying
 from app.glossary import term
 from app.rigs import Source
 from app.words import block
@@ -13,6 +15,7 @@ from core.session_state import State
 from core.suggested_plan import unseen_joints
 from core.wording import fixed
 
+SESSION_WORD = "session-"
 SOURCES = {
     Source.DEMO: "the built-in demo cell: a <b>simulated</b> robot and instrument",
     Source.SIMULATED: "a <b>simulated</b> arm of this robot, for practice: nothing is measured",
@@ -97,7 +100,12 @@ def sessions_words(summaries: tuple[SessionSummary, ...], chosen: str, most: int
     rows = "".join(_session_row(one, one.path.name == chosen) for one in summaries[:most])
     more = f"<p class='soft'>and {len(summaries) - most} more; search for them.</p>" if len(summaries) > most else ""
     head = "<tr><th>Session</th><th class='n'>Shots</th><th>Changed (UTC)</th></tr>"
-    return block(f"<table>{head}{rows}</table>{more}", "session-list")
+    return block(listening(f"<table>{head}{rows}</table>") + more, "session-list")
+
+
+def session_word(name: str) -> str:
+    """What the row of a session says when it is clicked; short, however long the name of its file is."""
+    return f"{SESSION_WORD}{crc32(name.encode()):08x}"
 
 
 def _session_row(one: SessionSummary, chosen: bool) -> str:
@@ -105,7 +113,8 @@ def _session_row(one: SessionSummary, chosen: bool) -> str:
     told = f"{escape(one.title)}<br><span class='soft'>{escape(one.path.name)}<br>{who}</span>"
     told += f"<br><span class='bad'>{escape(one.problem[:160])}</span>" if one.problem else ""
     return (
-        f"<tr class='{'now' if chosen else ''}'><td>{told}</td>"
+        f"<tr class='{'now' if chosen else ''}' {saying(session_word(one.path.name), 'Choose this session')}>"
+        f"<td>{told}</td>"
         f"<td class='n'>{one.shots}/{one.planned}</td><td>{escape(one.changed_utc[:16].replace('T', ' '))}</td></tr>"
     )
 

@@ -216,7 +216,8 @@ class Dashboard:
         """A finding or a row of a table was clicked: show it where it is, and fly there."""
         if self.results.tabs.heard(client.client_id, word):
             return
-        self.acquire.heard(SimpleNamespace(client=client), word)
+        for panel in (self.start, self.acquire):
+            panel.heard(SimpleNamespace(client=client), word)
         spot = spot_named(word)
         if spot is None:
             self.verify.heard(client, word)

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 
 import viser
 
-from app.cell_words import sessions_words
+from app.cell_words import SESSION_WORD, session_word, sessions_words
 from app.exports import stamped
 from app.words import block
 from app.workbench import Workbench
@@ -28,7 +28,7 @@ class SessionShelf:
         self._listed: object = None
         self._summaries: tuple[SessionSummary, ...] = ()
         self._shelf = Shelf(bench.session.path.parent)
-        text = "Every session is one file in one folder; nothing in it is ever deleted."
+        text = "Every session is one file in one folder; nothing in it is ever deleted. Click one, then press Open."
         gui.add_html(block(f"<p class='soft'>{text}</p>", "sessions-intro"))
         self._words = gui.add_text("Search", "", hint="Words of title, robot, people, serial numbers, notes.")
         self._words.on_update(lambda _: self._list())
@@ -55,6 +55,16 @@ class SessionShelf:
             own = self._bench.session.path.name
             if own in self._chosen.options:
                 self._chosen.value = own
+
+    def heard(self, event: object, word: str) -> None:
+        """A row of the list was clicked: choose that session."""
+        if word.startswith(SESSION_WORD):
+            self._ask(event, lambda client: self._choose(word))
+
+    def _choose(self, word: str) -> None:
+        name = next((name for name in self._chosen.options if session_word(name) == word), None)
+        if name is not None:
+            self._chosen.value = name
 
     def _list(self) -> None:
         self._summaries = self._found(str(self._words.value)[:200])

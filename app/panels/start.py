@@ -52,6 +52,10 @@ class StartPanel:
         for part in (self._targets, self._instrument, self._sweeps, self._new, self._shelf):
             part.refresh()
 
+    def heard(self, event: object, word: str) -> None:
+        """Something of this step was clicked."""
+        self._shelf.heard(event, word)
+
     def _fill(self) -> None:
         """The boxes as the session has them; done once, for what is typed must not be written over."""
         state = self._bench.state

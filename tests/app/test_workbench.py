@@ -167,7 +167,9 @@ def test_switching_to_another_session_forgets_the_solution_and_closes_the_first(
     bench.runs.run(False)
     bench.solving.solve()
     first = bench.session
+    bench.runs.paused = True
     bench.switch(Session.create(tmp_path / f"b{SUFFIX}", demo_events(bench.rig.cell)))
+    assert bench.runs.paused is None
     assert first.read_only
     assert bench.calibration is None
     assert bench.state.shots == ()

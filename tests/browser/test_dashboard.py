@@ -1,5 +1,6 @@
 """An operator's way through the demo cell, in a real browser."""
 
+import contextlib
 import json
 import re
 from io import BytesIO
@@ -95,6 +96,39 @@ def choose(page, label: str, option: str) -> None:
         except playwright.TimeoutError:
             page.keyboard.press("Escape")
     raise AssertionError(f"{label}: {option} cannot be chosen")
+
+
+def folder(page, name: str) -> None:
+    """Open a folder; a click that the page has not taken, as it was being drawn anew, is made again."""
+    head = page.locator("div.mantine-Paper-root", has=page.locator("svg.tabler-icon")).filter(
+        has_text=re.compile(f"^{re.escape(name)}$"), visible=True
+    )
+    for _ in range(PATIENCE_MS // LIST_MS):
+        if head.last.locator(".tabler-icon-chevron-up").count():
+            return
+        head.last.click()
+        with contextlib.suppress(playwright.TimeoutError):
+            head.last.locator(".tabler-icon-chevron-up").wait_for(timeout=LIST_MS)
+    raise AssertionError(f"the folder {name} does not open")
+
+
+def fill(page, box, value: str, held) -> None:
+    """Fill a box and wait until the server has it; ``held`` is the server's side of the box.
+
+    A browser sends what it was given last, at most every 50 ms: so nothing else may be touched at once.
+    """
+    box.fill(value)
+    until(page, lambda: held.value == (value if isinstance(held.value, str) else float(value)))
+    page.wait_for_timeout(80)
+
+
+def until(page, happened) -> None:
+    """Wait for something on the server's side."""
+    for _ in range(PATIENCE_MS // 20):
+        if happened():
+            return
+        page.wait_for_timeout(20)
+    raise AssertionError("it did not happen")
 
 
 def wait_for_text(page, test_id: str, words: str) -> None:
@@ -272,7 +306,7 @@ def test_check_the_instrument_then_begin_a_new_session(page, dashboard):
     measure(page, 2)
     first = dashboard.bench.session.path.name
     tab(page, "1 Cell")
-    page.get_by_text("New session", exact=True).filter(visible=True).last.click()
+    folder(page, "New session")
     press(page, "Begin")
     page.wait_for_function(
         "first => !document.querySelector('[data-testid=cell]').innerText.includes(first)", arg=first

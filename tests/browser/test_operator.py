@@ -4,8 +4,22 @@ import re
 
 import numpy as np
 import pytest
-from test_dashboard import READY, chromium, group, measure, press, started, tab, visit, wait_for_text  # noqa: F401
-from test_own_cell import alert, choose, folder, text_box
+from test_dashboard import (  # noqa: F401
+    READY,
+    choose,
+    chromium,
+    fill,
+    folder,
+    group,
+    measure,
+    press,
+    started,
+    tab,
+    until,
+    visit,
+    wait_for_text,
+)
+from test_own_cell import alert, text_box
 
 from core.session_store import SUFFIX
 
@@ -19,7 +33,8 @@ LAYOUT = """() => {
   const name = e => e.dataset.testid || e.title || e.innerText?.trim().slice(0, 30) || e.tagName;
   const seen = e => {
     let { left, right, top, bottom } = e.getBoundingClientRect();
-    for (let p = e.closest('[data-scrollarea-viewport]'); p; p = p.parentElement.closest('[data-scrollarea-viewport]')) {
+    const viewport = '[data-scrollarea-viewport]';
+    for (let p = e.closest(viewport); p; p = p.parentElement.closest(viewport)) {
       const window_ = p.getBoundingClientRect();
       top = Math.max(top, window_.top); bottom = Math.min(bottom, window_.bottom) }
     return { left, right, top, bottom } };
@@ -61,18 +76,23 @@ def page(chromium, dashboard):  # noqa: F811
 
 
 def test_who_and_what_are_kept_checked_and_signed(page, dashboard):
-    text_box(page, "Operator").fill("B. Somebody")
-    page.wait_for_timeout(150)
-    text_box(page, r"Air temperature \[°C\]").fill("warm")
-    page.wait_for_timeout(150)
+    start = dashboard.start
+    warmth, load = text_box(page, r"Air temperature \[°C\]"), text_box(page, r"Payload \[kg\]")
+    fill(page, text_box(page, "Operator"), "B. Somebody", start._who)
+    fill(page, warmth, "warm", start._conditions["temperature_c"])
     press(page, "Keep these")
     alert(page, "expected a number from -60 to 100")
     assert dashboard.bench.state.operator != "B. Somebody"
-    text_box(page, r"Air temperature \[°C\]").fill("22.5")
-    text_box(page, r"Payload \[kg\]").fill("3")
-    page.wait_for_timeout(150)
+    fill(page, warmth, "22.5", start._conditions["temperature_c"])
+    fill(page, load, "3", start._conditions["payload_kg"])
+    # A scanner types faster than a browser sends, and ends with Enter.
+    text_box(page, "Robot serial number").press_sequentially("SN-12345", delay=0)
+    page.keyboard.press("Enter")
+    until(page, lambda: start._facts["Robot serial number"].value == "SN-12345")
+    page.wait_for_timeout(80)
     press(page, "Keep these")
     wait_for_text(page, "cell", "22.5")
+    wait_for_text(page, "cell", "SN-12345")
     tab(page, "2 Measure")
     measure(page, 1)
     shot = dashboard.bench.state.shots[0]
@@ -114,13 +134,12 @@ def test_sweeps_are_made_in_any_order_with_extra_stops_and_skips(page, dashboard
     wait_for_text(page, "undo", "the skipping of joint 4, stop 2")
     folder(page, "Extra stop")
     choose(page, "Sweep", "joint 4, sweep 1")
-    page.get_by_label("Command [° or mm]", exact=True).filter(visible=True).first.fill("12.5")
-    page.wait_for_timeout(200)
+    command = page.get_by_label("Command [° or mm]", exact=True).filter(visible=True).first
+    fill(page, command, "12.5", dashboard.acquire._extra._at)
     press(page, "Measure extra stop")
     wait_for_text(page, "sweeps", "2 extra")
     assert np.rad2deg(bench.state.shots[-1].taken.commanded[3]) == pytest.approx(12.5, abs=1e-3)
-    page.get_by_label("Command [° or mm]", exact=True).filter(visible=True).first.fill("300")
-    page.wait_for_timeout(200)
+    fill(page, command, "300", dashboard.acquire._extra._at)
     press(page, "Measure extra stop")
     alert(page, "beyond its limits -90 to 90 deg")
 
@@ -137,8 +156,7 @@ def test_a_point_is_chosen_by_click_excluded_for_a_reason_and_the_solution_follo
     tab(page, "2 Measure")
     chosen = click_a_shot(page, dashboard)
     choose(page, "Reason", "in my own words")
-    text_box(page, "In my words").fill("<b>a bird</b> sat on it")
-    page.wait_for_timeout(200)
+    fill(page, text_box(page, "In my words"), "<b>a bird</b> sat on it", dashboard.acquire._words)
     group(page, "Exclude")
     wait_for_text(page, "shot", "<b>a bird</b> sat on it")
     shot = bench.state.shot(chosen)
@@ -185,8 +203,8 @@ def test_the_family_of_a_drive_is_chosen_and_limits_are_counted(page, dashboard)
     page.wait_for_selector("[data-testid=noise]")
     assert bench.calibration.estimate.transmissions[0].form.name == "harmonics_2"
     tab(page, "Geometry")
-    page.get_by_label("Limit for lengths [mm]", exact=True).filter(visible=True).fill("1000")
-    page.wait_for_timeout(200)
+    limit = page.get_by_label("Limit for lengths [mm]", exact=True).filter(visible=True)
+    fill(page, limit, "1000", dashboard.results._limits["limit_length_mm"])
     press(page, "Keep limits")
     wait_for_text(page, "limits", "0 beyond")
     assert bench.state.settings["limit_length_mm"] == 1000.0
@@ -299,5 +317,11 @@ def test_a_table_of_long_spans_and_of_sliding_joints_fits(page):
 
 def stands_well(page, where: str) -> None:
     """Nothing is wider than its place, nothing lies on something else, and the scene keeps its share."""
-    page.wait_for_timeout(400)
-    assert page.evaluate(LAYOUT) == [], where
+    wrong = page.evaluate(LAYOUT)
+    for _ in range(50):
+        if not wrong:
+            break
+        # Folders open slowly.
+        page.wait_for_timeout(100)
+        wrong = page.evaluate(LAYOUT)
+    assert wrong == [], where

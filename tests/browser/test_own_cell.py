@@ -7,7 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_dashboard import choose, chromium, group, measure, press, started, tab, visit, wait_for_text  # noqa: F401
+from test_dashboard import (  # noqa: F401
+    READY,
+    choose,
+    chromium,
+    fill,
+    folder,
+    group,
+    measure,
+    press,
+    started,
+    tab,
+    until,
+    visit,
+    wait_for_text,
+)
 
 from app.rigs import Source
 from core.calibration import calibrate
@@ -50,10 +64,6 @@ def page(chromium, dashboard):  # noqa: F811
     yield one
     assert one.problems == []
     one.close()
-
-
-def folder(page, name: str) -> None:
-    page.get_by_text(name, exact=True).filter(visible=True).last.click()
 
 
 def send(page, name: str, content: bytes | str) -> None:
@@ -161,8 +171,7 @@ def test_targets_instrument_and_sweeps_are_the_operators(page, dashboard):
     wait_for_text(page, "cell-intro", "Three axes")
     state = lambda: dashboard.bench.state  # noqa: E731
     folder(page, "Targets")
-    text_box(page, "Name").fill("P2")
-    page.wait_for_timeout(200)
+    fill(page, text_box(page, "Name"), "P2", dashboard.start._targets._name)
     group(page, "Add or change")
     wait_for_text(page, "target-list", "P2")
     assert state().target_links == {"T1": 3, "P2": 1}
@@ -173,8 +182,8 @@ def test_targets_instrument_and_sweeps_are_the_operators(page, dashboard):
     assert state().instrument.kind == "total-station"
     folder(page, "Sweeps")
     press(page, "Suggest all")
-    page.wait_for_timeout(500)
-    assert {row.joint: row.targets for row in state().plan.sweeps} == {3: ("T1",), 2: ("T1",), 1: ("T1",)}
+    suggested = {3: ("T1",), 2: ("T1",), 1: ("T1",)}
+    until(page, lambda: {row.joint: row.targets for row in state().plan.sweeps} == suggested)
 
 
 def test_points_of_a_sweep_come_from_a_csv_file(page, dashboard):
@@ -246,6 +255,20 @@ def test_a_file_that_is_no_use_is_refused_in_a_sentence(page, dashboard, name, c
     assert page.evaluate("window.hacked") is None
 
 
+def test_a_file_from_a_watcher_is_refused_and_its_button_can_be_pressed_again(chromium, page, dashboard):  # noqa: F811
+    watcher = visit(chromium, dashboard)
+    try:
+        folder(watcher, "New session")
+        send(watcher, "robot.toml", ROBOT)
+        alert(watcher, "Another browser holds the operator's seat")
+        watcher.get_by_role("alert").filter(has_text="Uploading").wait_for(state="detached")
+        upload = watcher.get_by_role("button", name="Files of a robot, campaign or session")
+        assert upload.is_enabled()
+        assert dashboard.start._new._tray.files == ()
+    finally:
+        watcher.close()
+
+
 def test_a_session_is_found_copied_sent_and_opened_again(page, dashboard, tmp_path):
     tab(page, "2 Measure")
     measure(page, 2)
@@ -254,6 +277,13 @@ def test_a_session_is_found_copied_sent_and_opened_again(page, dashboard, tmp_pa
     wait_for_text(page, "session-list", "ASEA IRB L6")
     group(page, "Copy")
     page.wait_for_function("() => document.querySelectorAll('[data-testid=session-list] tr').length === 3")
+    wait_for_text(page, "session-list", "2/129")
+    chosen, own = dashboard.start._shelf._chosen, dashboard.bench.session.path.name
+    assert chosen.value == own
+    page.locator("[data-testid=session-list] tr:not(.now)[data-say]").click()
+    until(page, lambda: chosen.value != own)
+    page.locator("[data-testid=session-list] tr.now").click()
+    until(page, lambda: chosen.value == own)
     with page.expect_download() as waiting:
         press(page, "Session as one file")
     sent = Path(waiting.value.path()).read_bytes()
