@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.gap.advice import _block_sums
+from core.gap.advice import block_sums
 from core.gap.expected_evidence import columns_of, size_for
 from core.gap.experiments import Block, blocks_for
 from core.gap.isolability import APART, Isolability, Isolated
@@ -60,7 +60,7 @@ def additions(found: Isolability) -> tuple[Addition, ...]:
     out = []
     for block, joint in _blocks(found, doubtful):
         concerned = [one for one in doubtful if joint is None or joint in _joints(one)]
-        sums = BlockSums(columns, _block_sums(found.problem, block, every, columns))
+        sums = BlockSums(columns, block_sums(found.problem, block, every, columns))
         tried = [_parting(found, one, sums) for one in concerned]
         partings = [parting for parting in tried if parting.parted or parting.shows]
         if partings:

@@ -40,7 +40,7 @@ def advice(analysis: Analysis, places: tuple[Place, ...]) -> Rivals:
     now = _noncentrality(sums, precision, problem, estimate)
     best: tuple[float, Block] | None = None
     for block in blocks_for(problem.sim.seen, places[0].joint or places[1].joint):
-        then = _noncentrality(sums + _block_sums(problem, block, groups, columns), precision, problem, estimate)
+        then = _noncentrality(sums + block_sums(problem, block, groups, columns), precision, problem, estimate)
         if best is None or then > best[0]:
             best = (then, block)
     if best is None or best[0] < max(STRUCTURAL * now, ENOUGH):
@@ -67,7 +67,7 @@ def _known(analysis: Analysis, groups: list[int]) -> tuple[np.ndarray, Array, Ar
     return index, sums, precision, evidence.solution(first)
 
 
-def _block_sums(problem: Problem, block: Block, groups: list[int], columns: np.ndarray) -> Array:
+def block_sums(problem: Problem, block: Block, groups: list[int], columns: np.ndarray) -> Array:
     """The sums that a block would add, with the noise that the points so far have on average."""
     seen = observe_block(problem.sim.seen, block)
     told = doings(seen)

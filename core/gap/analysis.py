@@ -274,19 +274,19 @@ def _with_geometry(problem: Problem, drawn: float) -> tuple[Evidence, float, flo
     """The search when the sim's geometry is generally off: every frame and zero offset is a cause from the start."""
     evidence = problem.evidence(AS_CALIBRATED)
     threshold = null_threshold(problem, evidence)
-    given = Chosen()
-    members = [
-        k for k in problem.named if problem.candidates[k].place.effect == "geometry" or _zero_of_joint(problem, k)
-    ]
-    for k in members:
-        given = given.plus(int(k), drawn / float(problem.design.scale[problem.slices[k].start]))
+    given = drawn_geometry(problem, drawn)
     found = search(evidence, problem.named, problem.cost, threshold, given)
     return evidence, AS_CALIBRATED, threshold, found, given
 
 
-def _zero_of_joint(problem: Problem, k: int) -> bool:
-    candidate = problem.candidates[k]
-    return candidate.place.effect == "zero_offset" and candidate.atom == ""
+def drawn_geometry(problem: Problem, size: float = UNCALIBRATED) -> Chosen:
+    """Every frame and zero offset, each with the scale (rad, m) that a drawing may be off by."""
+    members = [int(k) for k in problem.named if _of_geometry(problem.candidates[k])]
+    return Chosen(tuple(members), tuple(size / float(problem.design.scale[problem.slices[k].start]) for k in members))
+
+
+def _of_geometry(candidate: Candidate) -> bool:
+    return candidate.place.effect == "geometry" or (candidate.place.effect == "zero_offset" and not candidate.atom)
 
 
 def _learn(

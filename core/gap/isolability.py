@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.gap.analysis import AS_CALIBRATED, UNCALIBRATED, null_threshold
+from core.gap.analysis import AS_CALIBRATED, drawn_geometry, null_threshold
 from core.gap.detection import SURE
 from core.gap.evidence import Chosen, without
 from core.gap.expected_evidence import size_for
@@ -97,18 +97,6 @@ def isolability(campaign: Campaign, drawn: bool = False) -> Isolability:
     for g in given.groups:
         effects += _isolated(problem, without(given, (g,)), [*rest, g], [g], needed)
     return Isolability(problem, drawn, noise_rms_m(problem), needed, tuple(effects))
-
-
-def drawn_geometry(problem: Problem) -> Chosen:
-    """Every frame and zero offset, with the scale that drawings are off by: what a diagnosis of such a sim fits."""
-    members = [int(k) for k in problem.named if _of_geometry(problem, int(k))]
-    sizes = [UNCALIBRATED / float(problem.design.scale[problem.slices[k].start]) for k in members]
-    return Chosen(tuple(members), tuple(sizes))
-
-
-def _of_geometry(problem: Problem, group: int) -> bool:
-    candidate = problem.candidates[group]
-    return candidate.place.effect == "geometry" or (candidate.place.effect == "zero_offset" and not candidate.atom)
 
 
 def _isolated(
