@@ -30,6 +30,11 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
     undoable: ClassVar[bool] = True
     """Whether an operator's undo takes it back; what merely took place cannot be."""
 
+    @property
+    def bears_on_solution(self) -> bool:
+        """Whether a solution from before it may be out of date."""
+        return self.undoable
+
 
 class Created(Event, frozen=True, tag="created"):
     """The session begins."""
@@ -118,6 +123,8 @@ class Planned(Event, frozen=True, tag="plan"):
 class PosesPlanned(Event, frozen=True, tag="poses"):
     """The poses at which the arm is to be verified; see ``core.session_poses``."""
 
+    bears_on_solution = False
+
     wanted: Annotated[tuple[Numbers, ...], Meta(max_length=MOST_POSES)]
     targets: Annotated[tuple[Line, ...], Meta(max_length=100)]
 
@@ -134,6 +141,11 @@ class Setting(Event, frozen=True, tag="setting"):
 
     key: Line
     value: Line | Number | bool | None
+
+    @property
+    def bears_on_solution(self) -> bool:
+        """Limits judge a solution, they do not change it."""
+        return not self.key.startswith("limit_")
 
 
 class ShotTaken(Event, frozen=True, tag="shot"):
@@ -173,6 +185,11 @@ class ShotTaken(Event, frozen=True, tag="shot"):
     """Of a compensated pose: commands by which the nominal arm would take it, (n,)."""
     target_quaternion: tuple[Number, Number, Number, Number] | None = None
     simulated_point_m: Point | None = None
+
+    @property
+    def bears_on_solution(self) -> bool:
+        """Test poses are kept from every fit."""
+        return self.phase != "pose"
 
 
 class Judged(Event, frozen=True, tag="judged"):

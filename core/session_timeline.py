@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from core.session_entries import Entry
-from core.session_events import Opened, Redo, SessionError, Undo
+from core.session_events import Event, Opened, Redo, SessionError, Undo
 from core.session_fold import applied, folded
 from core.session_state import State
 
@@ -56,13 +56,19 @@ class Timeline:
         return next(opened, self.last + 1)
 
     def decisions_since(self, seq: int) -> int:
-        """How many entries after this one may change a solution: what can be undone, and undo and redo themselves."""
+        """How many entries after this one may change a solution, undo and redo of such among them."""
         count = 0
         for entry in reversed(self._entries.values()):
             if entry.seq <= seq:
                 break
-            count += entry.event.undoable or isinstance(entry.event, Undo | Redo)
+            count += self._bears_on_solution(entry.event)
         return count
+
+    def _bears_on_solution(self, event: Event) -> bool:
+        if not isinstance(event, Undo | Redo):
+            return event.bears_on_solution
+        meant = self._entries.get(event.event)
+        return meant is None or meant.event.bears_on_solution
 
     def counts(self, seq: int) -> bool:
         """Whether an entry counts now."""

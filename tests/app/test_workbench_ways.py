@@ -2,6 +2,7 @@
 
 import threading
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -147,6 +148,21 @@ def test_conditions_ride_on_every_shot(bench):
     assert shot.taken.payload_kg == 3.0
     # The simulated instrument has a thermometer of its own.
     assert shot.taken.temperature_c != 25.0
+
+
+def test_limits_and_test_poses_leave_a_solution_up_to_date(bench):
+    bench.runs.run(False)
+    bench.solving.solve()
+    bench.session.append_all([Setting("limit_length_mm", 1.0), Setting("limit_pose_mm", 1.0)])
+    pose = bench.state.shots[-1].taken
+    bench.session.append(msgspec.structs.replace(pose, phase="pose", joint=0, step=-1, pose=0))
+    bench.decisions.undo()
+    bench.decisions.redo()
+    assert bench.solving.since_solved == 0
+    bench.decisions.exclude(bench.state.shots[0].id, "bumped")
+    assert bench.solving.since_solved == 1
+    bench.decisions.undo()
+    assert bench.solving.since_solved == 2
 
 
 def test_after_a_restart_the_solution_is_computed_again_unless_something_changed(bench):
