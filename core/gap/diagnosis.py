@@ -162,10 +162,14 @@ class Findings:
         everything = [*named, *unknown]
         whole = self.judge.square(_chosen(everything))
         lost = [self.judge.square(_chosen([o for o in everything if o is not one])) - whole for one in everything]
-        most = max(lost[: len(named)], default=np.inf)
+        most = max(lost[: len(named)], default=np.inf) + SURE_OF_REST * self.judge.closable_m2
         first = [one for one, m2 in zip(unknown, lost[len(named) :], strict=True) if m2 > most]
         if first:
-            named = [one for one, m2 in zip(named, lost, strict=False) if m2 > TOLD_SHARE * self.judge.closable_m2]
+            adds = (
+                self._is_given(one) or m2 > TOLD_SHARE * self.judge.closable_m2
+                for one, m2 in zip(named, lost, strict=False)
+            )
+            named = [one for one, kept in zip(named, adds, strict=True) if kept]
         return [*first, *named, *(one for one in unknown if one not in first)]
 
     @cached_property
@@ -177,9 +181,12 @@ class Findings:
         evidence, everything = self.analysis.evidence, joined(_chosen(named), self.analysis.given)
         return evidence.given(everything) - evidence.given(without(everything, stand.groups))
 
+    def _is_given(self, stand: Stand) -> bool:
+        return bool(stand.groups) and stand.groups[0] in self.analysis.given.groups
+
     def _matters(self, stand: Stand, others: list[Stand]) -> bool:
         """Whether geometry that is fitted anyway is worth telling of."""
-        if stand.groups[0] not in self.analysis.given.groups:
+        if not self._is_given(stand):
             return True
         a = self.analysis
         known = without(joined(a.given, a.found.worth), stand.groups)
@@ -415,8 +422,6 @@ def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, 
         # The geometry as a whole is settled by points kept out; this is about the one frame.
         return _significance(found, stand), (stand.place,)
     probability, alike = twins(stand, rivals(found.judge, stand, joined(others, found.analysis.found.chosen)))
-    if len(found.named) == len(found.stands):
-        return probability, alike
     return probability * adequate(found.judge, _chosen(found.named), _chosen(found.stands)), alike
 
 

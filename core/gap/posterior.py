@@ -5,6 +5,7 @@ changes the evidence by that share, so differences below it decide nothing.
 """
 
 import numpy as np
+from scipy.special import expit
 
 from core.gap.evidence import Chosen, joined, without
 from core.gap.open_set import LOCALLY, Judge, Stand
@@ -15,6 +16,11 @@ NO_CAUSE = Place("none")
 FORM_ERROR = 0.002
 """Share of the evidence that rough forms of effects can be wrong by."""
 NAMED_AT, NAMED_WIDTH = LOCALLY, 0.012
+CLOSES_AT, CLOSES_WIDTH = 0.82, 0.03
+"""Share of the gap beyond the floor that names close together at which they are as likely wrong as right: where they
+leave more, something without a name is at work and they stand in for it. From simulated worlds with known causes."""
+MOST = 0.97
+"""However well a name fits, so often it is right in those worlds."""
 TWIN_ODDS = 0.05
 """A candidate at least so probable beside the named one is its twin."""
 
@@ -62,14 +68,16 @@ def _odds(evidence: Array, width: np.ndarray, mine: int) -> Array:
 
 
 def adequate(judge: Judge, named: Chosen, everything: Chosen) -> float:
-    """Share of what can be closed at all that names close: where much has no name, names may stand in for it."""
-    base = judge.square(Chosen())
-    return float(np.clip((base - judge.square(named)) / max(base - judge.square(everything), 1e-300), 0.0, 1.0))
+    """Probability that names are not stand-ins: from what they close of the gap, and of what can be closed at all."""
+    closed = judge.square(Chosen()) - judge.square(named)
+    possible = judge.square(Chosen()) - judge.square(everything)
+    share = float(np.clip(closed / max(possible, 1e-300), 0.0, 1.0))
+    return MOST * share * float(expit((closed / judge.closable_m2 - CLOSES_AT) / CLOSES_WIDTH))
 
 
 def has_name(stand: Stand) -> float:
     """Probability that some name of the library is right, from how much nameless functions would still add."""
-    return float(1 / (1 + np.exp(-(stand.local - NAMED_AT) / NAMED_WIDTH)))
+    return float(expit((stand.local - NAMED_AT) / NAMED_WIDTH))
 
 
 def twins(stand: Stand, ranked: list[tuple[Place, float]]) -> tuple[float, tuple[Place, ...]]:
