@@ -39,6 +39,8 @@ from app.workbench import Workbench
 from core.errors import InputError
 
 THEME = {"show_logo": False, "show_share_button": False, "brand_color": (0, 114, 178)}
+DARK = {"brand_color": (86, 180, 233)}
+"""The dark blue would hardly be read on a dark page."""
 
 
 class Dashboard:
@@ -180,7 +182,7 @@ class Dashboard:
 
     def _darken(self, dark: bool) -> None:
         self._dark = dark
-        self.server.gui.configure_theme(dark_mode=dark, **THEME)
+        self.server.gui.configure_theme(dark_mode=dark, **(THEME | DARK if dark else THEME))
         self.results.show_dark(dark)
         self.verify.show_dark(dark)
         self.gap.show_dark(dark)

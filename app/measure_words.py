@@ -1,7 +1,8 @@
 """Small pieces of HTML for the measuring panel. Whatever comes from people or files is escaped here."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,6 +21,10 @@ from core.wording import decimals_for, display_unit, fixed, two_digits
 
 SWEEP_WORD = "sweep-"
 """What a row of the table says when it is clicked, before joint and sweep: ``sweep-6-1``."""
+SHOT_WORD = "shot-"
+"""What a shot in the table says when it is clicked, before its id."""
+MOST_TOLD = 4
+"""Shots of one sweep that are named in the table."""
 COPY = (
     "const t=this.dataset.copy,ok=()=>{this.textContent='copied';setTimeout(()=>this.textContent='copy',1500)};"
     "if(navigator.clipboard)navigator.clipboard.writeText(t).then(ok);"
@@ -76,12 +81,22 @@ def step_words(state: State, robot: Robot, by_hand: bool, expected: Expected | N
     )
 
 
-def sweeps_table(rows: tuple[SweepProgress, ...], robot: Robot) -> str:
-    """Table 1 as a living table; a click on a row goes on there."""
+def sweeps_table(
+    rows: tuple[SweepProgress, ...],
+    robot: Robot,
+    wrong: Mapping[tuple[int, int], Sequence[Shot]] = MappingProxyType({}),
+) -> str:
+    """Table 1 as a living table; a click on a row goes on there.
+
+    Args:
+        rows: one for each sweep.
+        robot: the nominal one.
+        wrong: by joint and sweep, the shots that are to be measured again; a click chooses one.
+    """
     if not rows:
         text = "No sweep is planned. Open <b>1 Cell</b>, <b>Sweeps</b>, and press <b>Suggest all</b>."
         return block(f"<p class='soft'>{text}</p>", "sweeps")
-    body = "".join(_table_row(row, robot) for row in rows)
+    body = "".join(_table_row(row, robot, wrong.get((row.planned.joint, row.planned.sweep), ())) for row in rows)
     several = any(row.planned.sweep > 1 for row in rows)
     names = (
         ("Joint", "", ""),
@@ -257,7 +272,7 @@ def _value(robot: Robot, k: int, value: float) -> str:
     return f"{np.rad2deg(value):.4f}°"
 
 
-def _table_row(row: SweepProgress, robot: Robot) -> str:
+def _table_row(row: SweepProgress, robot: Robot, wrong: Sequence[Shot]) -> str:
     planned = row.planned
     unit, scale = (" mm", 1e3) if robot.joints[planned.joint - 1].slides else ("°", 180 / np.pi)
     span = (planned.high - planned.low) * scale
@@ -265,7 +280,7 @@ def _table_row(row: SweepProgress, robot: Robot) -> str:
     name = f"{planned.joint}" if planned.sweep == 1 else f"{planned.joint}.{planned.sweep}"
     word = f"{SWEEP_WORD}{planned.joint}-{planned.sweep}"
     both = " ⇄" if planned.both_ways else ""
-    beside = _beside(row)
+    beside = _beside(row, wrong)
     notes = f"<tr class='more'><td></td><td class='soft' colspan='7'>{beside}</td></tr>" if beside else ""
     look = " ".join(["now"] * row.current + ["led"] * bool(beside))
     return (
@@ -282,15 +297,24 @@ def _state_of(row: SweepProgress) -> str:
     return "<b title='now'>▶</b>" if row.current else ""
 
 
-def _beside(row: SweepProgress) -> str:
+def _beside(row: SweepProgress, wrong: Sequence[Shot]) -> str:
     """What of a sweep is not as planned."""
     counts = (row.skipped, "skipped"), (row.extra, "extra"), (row.excluded, "excluded")
-    return ", ".join(f"{count} {word}" for count, word in counts if count)
+    told = [f"{count} {word}" for count, word in counts if count]
+    told += [f"and {len(wrong) - MOST_TOLD} more"] if len(wrong) > MOST_TOLD else []
+    return ", ".join([*(_wrong_words(shot) for shot in wrong[:MOST_TOLD]), *told])
+
+
+def _wrong_words(shot: Shot) -> str:
+    hint = "Choose this shot, to measure it again or to exclude it"
+    return f"<b class='bad' {saying(f'{SHOT_WORD}{shot.id}', hint)}>✖ record {shot.record}</b>"
 
 
 def _not_defined(so_far: SweepSoFar, slides: bool) -> str:
     """What is missing for an axis."""
     count, lacks, joint = len(so_far.shots), so_far.live.lacks, so_far.joint
+    if so_far.live.last is Verdict.AGAIN:
+        return f"The axis of joint {joint} was known before this shot, and is not with it."
     least = 3 if slides else 4
     if count < least:
         return f"{count} of at least {least} shots: the axis of joint {joint} is not defined yet."

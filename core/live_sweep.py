@@ -23,6 +23,10 @@ DOUBTFUL = 0.02
 """A shot that noise alone would put so far out less often than this is doubtful."""
 WRONG = 1e-4
 """... and less often than this, it is to be measured again."""
+LEAST_BEFORE = 6
+"""Shots that must have made an axis known before the next one can be called a slip."""
+FAR_OFF = 30.0
+"""So many standard deviations off their circle a slip lies: far beyond what a short arc leaves open of it."""
 
 
 class Verdict(StrEnum):
@@ -74,13 +78,15 @@ def live_sweep(
     """
     points, command = np.asarray(points_m, dtype=float).reshape(-1, 3), np.asarray(commanded, dtype=float)
     count = len(points)
+    slip = count > LEAST_BEFORE and not sliding and _is_slip(points, command, target, covariance_m2)
     try:
         fit = fit_axis(points, sliding=sliding, target=target, covariance_m2=covariance_m2, commanded=command)
     except (AxisUndefined, NotConverged) as error:
         lacks = None if sliding else _lacking(points, command, target, covariance_m2)
-        return LiveSweep(None, str(error), (Verdict.EARLY,) * count, np.full(count, np.nan), None, lacks)
+        chances = _chances(np.full(count, np.nan), slip)
+        return LiveSweep(None, str(error), tuple(map(_verdict, chances)), chances, None, lacks)
     judged = fit.degrees_of_freedom >= 3
-    chances = fit.outlier_probability if judged else np.full(count, np.nan)
+    chances = _chances(fit.outlier_probability if judged else np.full(count, np.nan), slip)
     moved = displacements(fit, points, target=target, commanded=command)
     return LiveSweep(fit, "", tuple(_verdict(chance) for chance in chances), chances, moved)
 
@@ -121,6 +127,36 @@ def place_std_at(fit: AxisFit, point_m: ArrayLike) -> float:
     along = float((np.asarray(point_m) - fit.line.point_m) @ fit.line.direction)
     carry = np.hstack([along * np.eye(2), np.eye(2)])
     return float(np.sqrt(np.trace(carry @ fit.covariance @ carry.T)))
+
+
+def _chances(chances: Array, slip: bool) -> Array:
+    """Chances of all shots; the last one has none where it is a slip."""
+    return np.append(chances[:-1], 0.0) if slip else chances
+
+
+def _is_slip(
+    points_m: Array, commanded: Array, target: ArrayLike | None, covariance_m2: ArrayLike | None
+) -> bool:
+    """Whether the last shot lies far off the circle of all the earlier ones, (k - 1, 3), of a rotary joint.
+
+    A wrong target or a slip of the pen can bend the arc so much that the axis goes through it, or that none is left to
+    judge it by.
+    """
+    which = np.zeros(len(points_m), dtype=int) if target is None else np.asarray(target)
+    stated = None if covariance_m2 is None else np.asarray(covariance_m2)[:-1]
+    if which[-1] not in which[:-1]:
+        return False
+    names, earlier = np.unique(which[:-1], return_inverse=True)
+    try:
+        before = fit_axis(points_m[:-1], target=earlier, covariance_m2=stated, commanded=commanded[:-1])
+    except (AxisUndefined, NotConverged):
+        return False
+    mine = int(np.searchsorted(names, which[-1]))
+    away = points_m[-1] - before.line.point_m
+    along = float(away @ before.line.direction)
+    outward = float(np.linalg.norm(away - along * before.line.direction))
+    off = np.hypot(along - before.height_m[mine], outward - before.radius_m[mine])
+    return bool(off > FAR_OFF * before.sigma_m * before.noise_factor)
 
 
 def _lacking(

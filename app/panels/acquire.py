@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import viser
 
 from app.measure_words import (
+    SHOT_WORD,
     SWEEP_WORD,
     run_words,
     shot_words,
@@ -17,10 +18,11 @@ from app.measure_words import (
 )
 from app.panels.extra_stop import ExtraStop
 from app.panels.typed_points import TypedPoints
-from app.sweep_progress import sweep_progress
+from app.sweep_progress import SweepProgress, sweep_progress
 from app.words import BIG
 from app.workbench import Workbench
 from core.errors import InputError
+from core.live_sweep import Verdict
 
 if TYPE_CHECKING:
     from core.session_state import Shot
@@ -36,6 +38,7 @@ class AcquirePanel:
     def __init__(self, gui: viser.GuiApi, bench: Workbench, ask: Callable) -> None:
         self._bench, self._ask = bench, ask
         self._chosen: int | None = None
+        self._judged: dict[tuple[int, int], tuple[tuple, tuple[Shot, ...]]] = {}
         self._began, self._done, self._total = 0.0, 0, 0
         self._step = gui.add_html("")
         self._typed = TypedPoints(gui, bench)
@@ -70,7 +73,7 @@ class AcquirePanel:
             state, bench.nominal, not bench.rig.moves_itself, expected, bench.known.aims(expected)
         )
         rows = sweep_progress(bench.state)
-        self._table.content = sweeps_table(rows, bench.nominal)
+        self._table.content = sweeps_table(rows, bench.nominal, self._wrong(rows))
         total = sum(row.planned.shots for row in rows)
         self._bar.value = 100.0 * sum(row.planned.shots - row.left for row in rows) / max(total, 1)
         self._verdict.content = self._last_verdict()
@@ -81,6 +84,25 @@ class AcquirePanel:
         self._shot.content = shot_words(chosen or self._last(), chosen is not None, state)
         self._typed.refresh()
         self._extra.refresh()
+
+    def _wrong(self, rows: tuple[SweepProgress, ...]) -> "dict[tuple[int, int], tuple[Shot, ...]]":
+        """Shots that are to be measured again, by sweep: in a run nobody reads every verdict."""
+        counting: dict[tuple[int, int], list[int]] = {}
+        for shot in self._bench.state.shots:
+            if shot.counts:
+                counting.setdefault((shot.taken.joint, shot.taken.sweep), []).append(shot.id)
+        found = {}
+        for sweep in {(row.planned.joint, row.planned.sweep) for row in rows} & counting.keys():
+            key = (self._bench.session, *counting[sweep])
+            if key != self._judged.get(sweep, ((), ()))[0]:
+                self._judged[sweep] = key, self._again(*sweep)
+            found[sweep] = self._judged[sweep][1]
+        return found
+
+    def _again(self, joint: int, sweep: int) -> "tuple[Shot, ...]":
+        so_far = self._bench.known.so_far(joint, sweep)
+        judged = zip(so_far.shots, so_far.live.verdicts, strict=True)
+        return tuple(shot for shot, verdict in judged if verdict is Verdict.AGAIN)
 
     def choose(self, number: int | None) -> None:
         """Choose a shot, as by a click in 3-D; None: the last one."""
@@ -146,7 +168,11 @@ class AcquirePanel:
         self._now(event, self._bench.runs.stop)
 
     def heard(self, event: object, word: str) -> None:
-        """A row of the table was clicked: go on with that sweep."""
+        """A row of the table was clicked: go on with that sweep; or a shot in it: choose it."""
+        number = word.removeprefix(SHOT_WORD)
+        if word.startswith(SHOT_WORD) and number.isdecimal() and self._bench.state.shot(int(number)) is not None:
+            self._ask(event, lambda client: self.choose(int(number)))
+            return
         joint, _, sweep = word.removeprefix(SWEEP_WORD).partition("-")
         if word.startswith(SWEEP_WORD) and joint.isdecimal() and sweep.isdecimal():
             self._ask_at_rest(event, lambda: self._bench.decisions.go_to(int(joint), int(sweep)))

@@ -29,6 +29,11 @@ class PlotBox:
         self._words = gui.add_html("")
         self.clear()
 
+    @property
+    def drawn(self) -> bool:
+        """Whether there is a plot."""
+        return self._plot.visible
+
     def show(self, figure: go.Figure, caption: str = "") -> None:
         """Draw a figure."""
         self._figure = figure

@@ -127,7 +127,8 @@ class ResultsPanel:
             return
         joint = last.taken.joint
         so_far = self._bench.known.so_far(joint, last.taken.sweep)
-        if so_far.live.fit is None:
+        if so_far.live.fit is None and not self._live.drawn:
+            # A plot that is there stays there: plotly fails where one goes away while it is drawn.
             self._live.clear(f"Residuals appear here once the axis of joint {joint} is known: see 2 Measure.")
             return
         command = np.array([s.taken.commanded[joint - 1] for s in so_far.shots])

@@ -112,6 +112,23 @@ def test_the_table_counts_and_can_be_clicked(bench):
     assert "No sweep is planned" in sweeps_table((), bench.nominal)
 
 
+def test_a_shot_that_went_wrong_is_named_in_the_table_and_in_words(bench):
+    bench.runs.run(False)
+    bench.decisions.undo()
+    bench.session.append(Setting(SETTING, "by hand"))
+    bench.changed()
+    bench.typed.enter("-3000 5400 60", "mm")
+    text = verdict_of(bench, 6)
+    assert "measure again" in text
+    assert "The axis of joint 6 was known before this shot, and is not with it." in text
+    slip = bench.state.shots[-1]
+    html = sweeps_table(sweep_progress(bench.state), bench.nominal, {(6, 1): [slip]})
+    assert f"data-say='shot-{slip.id}'" in html
+    assert "✖ record 17" in plain(html)
+    several = {(6, 1): bench.state.shots[:6]}
+    assert "✖ record 4, and 2 more" in plain(sweeps_table(sweep_progress(bench.state), bench.nominal, several))
+
+
 def test_sliding_joints_are_told_in_millimetres(tmp_path):
     with Session.create(tmp_path / f"s{SUFFIX}", demo_events(scara.cell())) as session:
         bench = Workbench(session)

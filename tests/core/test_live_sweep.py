@@ -46,6 +46,33 @@ def test_a_bad_shot_is_to_be_measured_again_wherever_it_is(row):
     assert live.verdicts.count(Verdict.AGAIN) == 1
 
 
+@pytest.mark.parametrize("size_m", [0.01, 0.1, 1.0])
+def test_a_slip_is_to_be_measured_again_even_where_it_leaves_no_axis_to_judge_by(size_m):
+    rng, bent = np.random.default_rng(0), 0
+    for seed in range(60):
+        points, command = shots(seed=seed)
+        way = rng.normal(size=3)
+        points[-1] += size_m * way / np.linalg.norm(way)
+        live = live_sweep(points, command)
+        bent += live.fit is None
+        assert live.last in (Verdict.AGAIN, Verdict.DOUBTFUL)
+        assert live.fit is not None or set(live.verdicts[:-1]) == {Verdict.EARLY}
+    assert (bent > 0) == (size_m == 0.1)
+
+
+@pytest.mark.parametrize("span_deg", [8.0, 15.0, 25.0])
+def test_where_noise_alone_leaves_no_axis_no_shot_is_blamed(span_deg):
+    undefined = 0
+    for seed in range(20):
+        points, command = shots(span_deg=span_deg, seed=seed)
+        points += 30 * SIGMA * np.random.default_rng(seed + 999).normal(size=points.shape)
+        for count in range(7, 18):
+            live = live_sweep(points[:count], command[:count])
+            undefined += live.fit is None
+            assert live.fit is not None or live.last is Verdict.EARLY
+    assert undefined > 50
+
+
 def test_false_alarms_are_as_rare_as_said():
     alarms = [verdict is not Verdict.KEEP for seed in range(200) for verdict in live_sweep(*shots(seed=seed)).verdicts]
     # 3,400 shots of a fair 2 %: 0.24 % standard deviation.
