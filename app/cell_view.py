@@ -19,9 +19,10 @@ from app.scene.stations import Station, StationsView
 from app.scene.sweep_circle import SweepCircle
 from app.spots import Spot
 from app.workbench import Workbench
+from core.arm import Arm
 from core.calibration import Calibration
 from core.estimate import ArmEstimate
-from core.geometry import Array
+from core.geometry import Array, Line
 from core.robot import Joint
 
 BLUE = (0, 114, 178)
@@ -61,6 +62,8 @@ class CellView:
         self._moving = threading.Lock()
         self.commanded: tuple[float, ...] = self._bench.robot.commanded
         """Where the arms are drawn."""
+        self._calibrated: Arm | None = None
+        """The arm as it is, once all of it is known."""
         self.drawn: Calibration | None = None
         """The calibration that is shown."""
         self.lit: Spot | None = None
@@ -93,6 +96,19 @@ class CellView:
         draw_floor(viewer.scene, floor_under(corners, self._floor_m))
         self.stations = StationsView(viewer, self._stations, self._floor_m)
 
+    def _draw_as_calibrated(self) -> None:
+        """Draw the arm with the axes and motions that it really has once all are known, else as designed."""
+        found = self.drawn
+        known = found is not None and not found.not_swept and found.refinement.tied
+        self._calibrated = found.estimate.arm if known else None
+        axes = self._calibrated.axes if known else self.ghost.axes
+        if all(_look_alike(one, other) for one, other in zip(axes, self.arm.axes, strict=True)):
+            return
+        opacity, visible, robot = self.arm.opacity, self.arm.visible, self._bench.nominal
+        self.arm.remove()
+        self.arm = RobotView(self._viewer, "/arm", axes, robot.sliding, couplings=robot.couplings)
+        self.arm.opacity, self.arm.visible = opacity, visible
+
     def _stand(self) -> None:
         """Draw the arms anew where the base is found to stand, if that is elsewhere by more than the eye sees."""
         base = self._bench.known.base().base
@@ -104,6 +120,7 @@ class CellView:
         for view in (self.arm, self.ghost, self.stations):
             view.remove()
         self._draw_arms()
+        self._draw_as_calibrated()
         self.ghost.visible = ghost
 
     def refresh(self) -> None:
@@ -139,11 +156,13 @@ class CellView:
         """Show the arms where commands put them."""
         with self._moving:
             self.commanded = tuple(commanded)
-            net = self._bench.nominal_net(commanded)
+            nominal = self._bench.nominal_net(commanded)
+            actual = nominal if self._calibrated is None else self._calibrated.net(np.array(commanded))[0]
             with self._viewer.atomic():
-                for view in (self.arm, self.ghost, self._axes):
+                self.ghost.show(nominal)
+                for view in (self.arm, self._axes):
                     if view is not None:
-                        view.show(net)
+                        view.show(actual)
 
     def follow_robot(self) -> None:
         """Show the arms where the robot is, or where it has to be sent."""
@@ -191,6 +210,7 @@ class CellView:
     def show_calibration(self, found: Calibration) -> None:
         """Show the fitted axes with their uncertainty, the nominal arm as a ghost, and the residuals."""
         self.drawn, self.lit = found, None
+        self._draw_as_calibrated()
         self.scale = ResidualScale.over(found.refinement.residuals.radial_m)
         geometry = found.estimate.geometry
         if geometry is not None and found.nominal is not None:
@@ -220,6 +240,7 @@ class CellView:
         if self.drawn is None:
             return
         self.drawn = None
+        self._draw_as_calibrated()
         self._clear_for_diagnosis(False)
         if self._axes is not None:
             self._axes.remove()
@@ -307,6 +328,12 @@ def axis_marks(estimate: ArmEstimate, hubs_m: Array) -> tuple[AxisMark, ...]:
         direction_std, place_std = estimate.axis_std(joint)
         marks.append(AxisMark(joint, line, hubs_m[joint - 1], direction_std, place_std, text=f"axis {joint}"))
     return tuple(marks)
+
+
+def _look_alike(one: Line, other: Line) -> bool:
+    """Whether two axes are nearer to each other than the eye sees."""
+    turned = np.abs(one.direction - other.direction).max()
+    return bool(max(turned, np.linalg.norm(one.foot_of(other.point_m) - other.point_m)) < SEEN_MOVING_M)
 
 
 def _verdict(word: str) -> Verdict:
