@@ -359,7 +359,7 @@ def _percent(chance: float) -> str:
 
 
 def _std(value: float) -> str:
-    return f"{value:.2g}" if value < 100 else f"{value:.0f}"
+    return two_digits(value) if value < 100 else f"{value:.0f}"
 
 
 def _duration(seconds: float) -> str:

@@ -26,7 +26,7 @@ overflow-wrap:normal}[data-testid=table1] th{white-space:nowrap}
 color:inherit;background:none;border:1px solid var(--mantine-color-default-border)}
 .ta .value{white-space:nowrap}.ta td.name{min-width:7.2em}
 div:has(> .ta-big)+div button{height:42px!important;font-size:17px;font-weight:700}
-div:has(> .ta-big)+div button svg{margin-inline-end:8px;width:20px;height:20px}
+div:has(> .ta-big)+div button .mantine-Button-label{padding-inline-start:6px}
 .ta[data-testid=seat]{margin-bottom:9px}
 [data-dock-area^=gui-tabs] [data-dock-tab]{padding:0 .45em!important}
 .ta dt{font-weight:600;margin-top:6px}.ta dd{margin:0 0 2px}
