@@ -19,7 +19,7 @@ from core.gap.evidence import Chosen, joined, without
 from core.gap.folds import blocks
 from core.gap.kept_out import KeptOut, mean_square
 from core.gap.observations import Observations, observe
-from core.gap.open_set import Judge, Stand, stands
+from core.gap.open_set import AT_FLOOR, EVERYWHERE, Judge, Stand, stands
 from core.gap.placement import placement_slots
 from core.gap.posterior import adequate, rivals, twins
 from core.gap.problem import Problem
@@ -52,6 +52,8 @@ SURE_OF_REST = 0.1
 """What nameless functions must still close, as a share of the gap, to be told as something unknown."""
 CLOSED = 0.9
 """Share of the gap beyond the floor that causes must close to explain it."""
+ALL_NEEDED = 0.7
+"""What all that was found leaves of kept-out points over what fewer names leave, where the small ones are real."""
 NEARLY = 2.0
 """Floors that may be left at most where causes explain a gap."""
 BEYOND_NOISE = 2.0
@@ -138,9 +140,28 @@ class Findings:
     @cached_property
     def judge(self) -> Judge:
         a = self.analysis
-        floor = float(np.mean(a.noise.floor_m2))
-        prior, found = a.geometry_prior, a.found
-        return Judge(a.problem, a.evidence, self.fold, prior, a.threshold, floor, found.chosen, found.worth, a.given)
+        return Judge(
+            a.problem,
+            a.evidence,
+            self.fold,
+            a.geometry_prior,
+            a.threshold,
+            self.floor_m2,
+            a.found.chosen,
+            self.worth,
+            a.given,
+        )
+
+    @cached_property
+    def worth(self) -> Chosen:
+        """What is to be judged: the main ones of many where all are needed and leave noise, else few that could do."""
+        a, found = self.analysis, self.analysis.found
+        if found.worth == found.main:
+            return found.main
+        all_of_them = joined(a.given, found.chosen, found.worth)
+        kept = KeptOut(a.problem, self.fold, a.geometry_prior, all_of_them.groups)
+        with_all, with_few = (kept.square_m2(joined(a.given, some)) for some in (found.chosen, found.worth))
+        return found.main if with_all < min(ALL_NEEDED * with_few, AT_FLOOR * self.floor_m2) else found.worth
 
     @cached_property
     def floor_m2(self) -> float:
@@ -189,7 +210,7 @@ class Findings:
         if not self._is_given(stand):
             return True
         a = self.analysis
-        known = without(joined(a.given, a.found.worth), stand.groups)
+        known = without(joined(a.given, self.worth), stand.groups)
         if not a.evidence.gains(np.array(stand.groups), known).evidence[0] > 0:
             return False
         rest = _chosen([one for one in others if one is not stand])
@@ -220,7 +241,8 @@ class Findings:
             if not any(one.place.same_as(unknown) for one in out):
                 out.append(Stand(unknown, rest.groups, rest.sizes, 0.0))
         noise = self.analysis.noise
-        told = noise.scattering in {one.place.joint for one in (*out, *named)}
+        known = [one.place for one in (*out, *named)]
+        told = noise.scattering in {one.joint for one in known} or any(one.effect in EVERYWHERE for one in known)
         if noise.scattering is not None and not told and (noise.excess > 1 or noise.unlike_statement):
             out.append(Stand(Place(UNKNOWN, joint=noise.scattering), (), (), 0.0))
         return out
@@ -421,14 +443,14 @@ def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, 
     if stand.groups[0] in found.analysis.given.groups:
         # The geometry as a whole is settled by points kept out; this is about the one frame.
         return _significance(found, stand), (stand.place,)
-    probability, alike = twins(stand, rivals(found.judge, stand, joined(others, found.analysis.found.chosen)))
+    probability, alike = twins(stand, rivals(found.judge, stand, others))
     return probability * adequate(found.judge, _chosen(found.named), _chosen(found.stands)), alike
 
 
 def _significance(found: Findings, stand: Stand) -> float:
     """Probability that a cause does anything at all, when everything else is given."""
     a = found.analysis
-    rest = without(joined(a.given, a.found.worth), stand.groups)
+    rest = without(joined(a.given, found.worth), stand.groups)
     return float(1 / (1 + np.exp(-a.evidence.gains(np.array(stand.groups), rest).evidence[0])))
 
 

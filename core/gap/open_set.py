@@ -5,13 +5,13 @@ What decides is how much of what could be explained at all a name explains on po
 against functions of the same variable, and globally, against functions of everything.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from core.gap.effects.candidate import Candidate
-from core.gap.evidence import NOTHING, Chosen, Evidence, joined
+from core.gap.evidence import NOTHING, Chosen, Evidence, joined, without
 from core.gap.kept_out import KeptOut
 from core.gap.problem import Problem
 from core.gap.result import Place
@@ -28,6 +28,8 @@ WEAKER = 0.10
 """Of what is closed at one place: the second name there must close so much."""
 MOVES = 0.1
 """Of what can be closed: what adds little to the evidence but closes so much is judged all the same."""
+AT_FLOOR = 1.5
+"""Times the noise (mean squares) that names leave at most where all of them, the small ones too, are real."""
 MOST_NAMELESS = 3
 COMPLETED = frozenset({"thermal", "drift", "axis_wobble", "linkage", "payload", "compliance", "flexure", "hysteresis"})
 """Effects whose forms are rough: several of one place describe it together."""
@@ -168,7 +170,9 @@ def stands(judge: Judge) -> list[Stand]:
     for k, group in enumerate(kept.groups):
         by_variable.setdefault(judge.variable(judge.problem.candidates[group].place), []).append(k)
     for variable, members in by_variable.items():
-        out += _at(judge, variable, _pick(kept, members), _elsewhere(judge, variable, kept))
+        here = _pick(kept, members)
+        elsewhere, small = _others(judge, variable, kept)
+        out += _at(judge, variable, here, elsewhere, small)
     return _steps_together(out)
 
 
@@ -179,11 +183,15 @@ def _worthy(judge: Judge) -> Chosen:
     return joined(judge.worth, _pick(found, [k for k, m2 in enumerate(lost) if m2 > MOVES * judge.closable_m2]))
 
 
-def _elsewhere(judge: Judge, variable: str, kept: Chosen) -> Chosen:
-    """All that was found at other variables, clutter included: nameless functions here shall not stand in for it."""
+def _others(judge: Judge, variable: str, kept: Chosen) -> tuple[Chosen, Chosen]:
+    """All that was found at other variables, clutter included: nameless functions here shall not stand in for it.
+
+    And what was found here and is too small to be judged.
+    """
     both = joined(kept, judge.found)
-    candidates = judge.problem.candidates
-    return _pick(both, [k for k, g in enumerate(both.groups) if judge.variable(candidates[g].place) != variable])
+    here = [judge.variable(judge.problem.candidates[g].place) == variable for g in both.groups]
+    elsewhere = _pick(both, [k for k, one in enumerate(here) if not one])
+    return elsewhere, without(_pick(both, [k for k, one in enumerate(here) if one]), kept.groups)
 
 
 def _steps_together(found: list[Stand]) -> list[Stand]:
@@ -209,36 +217,97 @@ def _predicting(judge: Judge, chosen: Chosen) -> Chosen:
     return chosen
 
 
-def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen) -> list[Stand]:
+def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Chosen) -> list[Stand]:
     """Names at one variable, or that it is unknown what acts there."""
-    without = judge.square(elsewhere)
     local = judge.local.get(variable, Chosen())
-    ceiling = without - min(judge.square(joined(elsewhere, here, local)), judge.square(joined(elsewhere, here)))
-    closes = [without - judge.square(joined(elsewhere, _pick(here, [k]))) for k in range(len(here.groups))]
-    order = list(np.argsort(closes)[::-1])
-    first = order[0]
-    share = closes[first] / max(ceiling, 1e-300)
-    same = [k for k in order if _place(judge, here, k).same_as(_place(judge, here, first))]
-    plain = judge.problem.candidates[here.groups[first]]
-    if share >= (EXACTLY if plain.place.effect in EXACT and _smooth(plain) else LOCALLY):
-        return [_stand(judge, here, same if _place(judge, here, first).effect in COMPLETED else [first], share)]
-    if len(same) > 1 and _place(judge, here, first).effect in COMPLETED:
-        together = (without - judge.square(joined(elsewhere, _pick(here, same)))) / max(ceiling, 1e-300)
-        if together >= LOCALLY:
-            return [_stand(judge, here, same, together)]
-    pairs = [k for k in order[1:] if _make_a_pair(judge, here, first, k)]
-    best = max(
-        ((without - judge.square(joined(elsewhere, _pick(here, [first, k]))), k) for k in pairs), default=(0.0, -1)
-    )
-    if best[1] >= 0 and best[0] / max(ceiling, 1e-300) >= LOCALLY and best[0] - closes[first] >= WEAKER * best[0]:
-        together = best[0] / max(ceiling, 1e-300)
-        return [_stand(judge, here, [first], together), _stand(judge, here, [best[1]], together)]
+    spot = Spot(judge, here, local, elsewhere)
+    named = _names(spot)
+    if not named and small.groups and judge.square(joined(elsewhere, here, small)) < AT_FLOOR * judge.floor_m2:
+        # Small causes at the same place are real where they complete the others down to the noise.
+        named = _names(replace(spot, elsewhere=joined(elsewhere, small)))
+    if named:
+        return named
     if not variable.startswith("joint"):
         place = Place("unknown", variable=variable)
     else:
         place = Place("unknown", joint=int(variable.split()[1]))
     groups = joined(local, here)
-    return [Stand(place, groups.groups, groups.sizes, share)]
+    return [Stand(place, groups.groups, groups.sizes, spot.share(spot.order[:1]))]
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """Names found at one variable, held against nameless functions of it."""
+
+    judge: Judge
+    here: Chosen
+    local: Chosen
+    """Nameless functions of the same variable."""
+    elsewhere: Chosen
+    """What is taken as given."""
+
+    @cached_property
+    def without_m2(self) -> float:
+        return self.judge.square(self.elsewhere)
+
+    @cached_property
+    def ceiling_m2(self) -> float:
+        """What can be closed here at all."""
+        given = joined(self.elsewhere, self.here)
+        return self.without_m2 - min(self.judge.square(joined(given, self.local)), self.judge.square(given))
+
+    def closes_m2(self, which: list[int]) -> float:
+        """What some of the names close."""
+        return self.without_m2 - self.judge.square(joined(self.elsewhere, _pick(self.here, which)))
+
+    def share(self, which: list[int]) -> float:
+        """Of what can be closed."""
+        return self.closes_m2(which) / max(self.ceiling_m2, 1e-300)
+
+    @cached_property
+    def order(self) -> list[int]:
+        """Names by what they close alone, the most first."""
+        alone = [self.closes_m2([k]) for k in range(len(self.here.groups))]
+        return [int(k) for k in np.argsort(alone)[::-1]]
+
+    def place(self, k: int) -> Place:
+        return self.judge.problem.candidates[self.here.groups[k]].place
+
+
+def _names(spot: Spot) -> list[Stand]:
+    """The names that suffice at one variable: one, several forms of one, or two; none: nameless functions do better."""
+    judge, here, first = spot.judge, spot.here, spot.order[0]
+    same = [k for k in spot.order if spot.place(k).same_as(spot.place(first))]
+    rough = spot.place(first).effect in COMPLETED
+    plain = judge.problem.candidates[here.groups[first]]
+    if spot.share([first]) >= (EXACTLY if plain.place.effect in EXACT and _smooth(plain) else LOCALLY):
+        which = same if rough else [first]
+        second = _second(spot, which)
+        stand = _stand(judge, here, which, spot.share([first]))
+        return [stand] if second is None else [stand, _stand(judge, here, [second], spot.share([first]))]
+    if len(same) > 1 and rough and spot.share(same) >= LOCALLY:
+        return [_stand(judge, here, same, spot.share(same))]
+    pairs = [k for k in spot.order[1:] if _make_a_pair(judge, here, first, k)]
+    best = max(pairs, key=lambda k: spot.closes_m2([first, k]), default=None)
+    if best is None:
+        return []
+    both, one = spot.closes_m2([first, best]), spot.closes_m2([first])
+    if spot.share([first, best]) >= LOCALLY and both - one >= WEAKER * both:
+        together = spot.share([first, best])
+        return [_stand(judge, here, [first], together), _stand(judge, here, [best], together)]
+    return []
+
+
+def _second(spot: Spot, which: list[int]) -> int | None:
+    """A second name at the same place that closes what the first leaves, where that is more than the noise."""
+    left = spot.ceiling_m2 - spot.closes_m2(which)
+    if left < spot.judge.floor_m2:
+        return None
+    for k in spot.order:
+        pair = k not in which and _make_a_pair(spot.judge, spot.here, which[0], k)
+        if pair and spot.closes_m2([*which, k]) - spot.closes_m2(which) >= LOCALLY * left:
+            return k
+    return None
 
 
 def _make_a_pair(judge: Judge, here: Chosen, first: int, second: int) -> bool:
@@ -251,10 +320,6 @@ def _make_a_pair(judge: Judge, here: Chosen, first: int, second: int) -> bool:
 def _smooth(candidate: Candidate) -> bool:
     orders = dict(candidate.fixed)
     return candidate.place.effect in SMOOTH or orders.get("order_1", np.inf) < RIPPLE
-
-
-def _place(judge: Judge, chosen: Chosen, k: int) -> Place:
-    return judge.problem.candidates[chosen.groups[k]].place
 
 
 def _pick(chosen: Chosen, which: list[int]) -> Chosen:

@@ -28,7 +28,7 @@ TWIN_ODDS = 0.05
 def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, float]]:
     """Named places with their probabilities, given the other causes, most probable first."""
     named = judge.problem.named
-    known = without(joined(judge.given, others), stand.groups)
+    known = without(joined(judge.given, others, _elsewhere(judge, stand)), stand.groups)
     gains = judge.evidence.gains(named, known)
     score = gains.evidence - judge.problem.cost[named]
     score[np.isin(named, known.groups)] = -np.inf
@@ -50,6 +50,12 @@ def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, floa
     weight = np.exp(_odds(np.array(best), np.array(wide), _index(places, stand.place)))
     order = np.argsort(-weight, kind="stable")
     return [(places[k], float(weight[k] / weight.sum())) for k in order]
+
+
+def _elsewhere(judge: Judge, stand: Stand) -> Chosen:
+    """Small causes that were found at other variables: what acts at the same may be the same."""
+    candidates, mine = judge.problem.candidates, judge.variable(stand.place)
+    return without(judge.found, [g for g in judge.found.groups if judge.variable(candidates[g].place) == mine])
 
 
 def _index(places: list[Place], place: Place) -> int:

@@ -21,7 +21,9 @@ class Found:
     """Log evidence of each candidate standing alone, less the cost of choosing, by candidate; -inf: not searched."""
     alone_size: Array
     worth: Chosen
-    """Those of them that are more than an imperfection of a stronger one."""
+    """Those of them that are more than an imperfection of a stronger one, each reconsidered when those are dropped."""
+    main: Chosen
+    """The same, none reconsidered: the greater ones of many that are all there."""
     log_evidence: float
     """Of all that is chosen, costs included, above placement and geometry alone."""
 
@@ -55,17 +57,19 @@ def search(
         if len(chosen.groups) > 1:
             chosen = _exchanged(evidence, among, cost, chosen, given)
     total = evidence.given(joined(given, chosen)) - sum(cost[g] for g in chosen.groups)
-    return Found(chosen, alone, alone_size, worth_naming(evidence, among, cost, chosen, given), float(total))
+    main = _without_the_least(evidence, chosen, given)
+    worth = worth_naming(evidence, among, cost, chosen, main, given)
+    return Found(chosen, alone, alone_size, worth, main, float(total))
 
 
-def worth_naming(evidence: Evidence, among: np.ndarray, cost: Array, chosen: Chosen, given: Chosen) -> Chosen:
+def worth_naming(
+    evidence: Evidence, among: np.ndarray, cost: Array, chosen: Chosen, main: Chosen, given: Chosen
+) -> Chosen:
     """What is left when candidates that add next to nothing to the others are dropped, each reconsidered then."""
-    kept = _without_the_least(evidence, chosen, given)
-    if len(kept.groups) < len(chosen.groups) and len(kept.groups) > 1:
-        kept = _without_the_least(evidence, _exchanged(evidence, among, cost, kept, given), given)
-    elif len(kept.groups) == 1 and len(chosen.groups) > 1:
-        kept = _exchanged(evidence, among, cost, kept, given)
-    return kept
+    if len(main.groups) == len(chosen.groups):
+        return main
+    kept = _exchanged(evidence, among, cost, main, given)
+    return _without_the_least(evidence, kept, given)
 
 
 def _without_the_least(evidence: Evidence, chosen: Chosen, given: Chosen) -> Chosen:
