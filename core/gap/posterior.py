@@ -19,8 +19,8 @@ NAMED_AT, NAMED_WIDTH = LOCALLY, 0.012
 CLOSES_AT, CLOSES_WIDTH = 0.82, 0.03
 """Share of the gap beyond the floor that names close together at which they are as likely wrong as right: where they
 leave more, something without a name is at work and they stand in for it. From simulated worlds with known causes."""
-MOST = 0.97
-"""However well a name fits, so often it is right in those worlds."""
+LEAST, MOST = 0.1, 0.97
+"""However badly or well names close, so often they are right in those worlds."""
 TWIN_ODDS = 0.05
 """A candidate at least so probable beside the named one is its twin."""
 
@@ -78,7 +78,8 @@ def adequate(judge: Judge, named: Chosen, everything: Chosen) -> float:
     closed = judge.square(Chosen()) - judge.square(named)
     possible = judge.square(Chosen()) - judge.square(everything)
     share = float(np.clip(closed / max(possible, 1e-300), 0.0, 1.0))
-    return MOST * share * float(expit((closed / judge.closable_m2 - CLOSES_AT) / CLOSES_WIDTH))
+    apart = float(expit((closed / judge.closable_m2 - CLOSES_AT) / CLOSES_WIDTH))
+    return share * (LEAST + (MOST - LEAST) * apart)
 
 
 def has_name(stand: Stand) -> float:
