@@ -21,7 +21,7 @@ from core.gap.kept_out import KeptOut, mean_square
 from core.gap.observations import Observations, observe
 from core.gap.open_set import AT_FLOOR, EVERYWHERE, Judge, Stand, stands
 from core.gap.placement import placement_slots
-from core.gap.posterior import adequate, rivals, twins
+from core.gap.posterior import adequate, rivals, sufficient, twins
 from core.gap.problem import Problem
 from core.gap.reliability import reliability
 from core.gap.result import (
@@ -43,13 +43,16 @@ from core.gap.widened import Wide, thinned, widened
 from core.geometry import Array
 from core.measurements import Campaign
 
-UNKNOWN_PROBABILITY = 0.8
-"""That something without a name acts at that joint or variable."""
+UNKNOWN_FIRST, UNKNOWN_BESIDE = 0.9, 0.35
+"""That something without a name acts at that joint or variable, where it is the strongest that is told, and where it
+is told beside others; as often as it was so in simulated worlds."""
 TOLD_SHARE = 0.01
 """Of the gap: a change of geometry that closes less, or a name that adds less to something unknown, is not told."""
 HOLD_OUT = "fifths of each arc and regions of the joint space, each predicted from the others"
 SURE_OF_REST = 0.1
 """What nameless functions must still close, as a share of the gap, to be told as something unknown."""
+FAINT = 1.3
+"""Times the noise (mean squares) of what does not stand out of it by itself."""
 CLOSED = 0.9
 """Share of the gap beyond the floor that causes must close to explain it."""
 ALL_NEEDED = 0.7
@@ -176,7 +179,24 @@ class Findings:
         order = [one for one in order if self.told or self._matters(one, order)]
         if self.told:
             return order
-        return self._strongest_first(order, self._unknown([one for one in judged if one.unknown], order))
+        if self._faint(order):
+            order = []
+        unknown = self._unknown([one for one in judged if one.unknown], order)
+        return [*self._stood_in_for(order, unknown), *self._strongest_first(order, unknown)]
+
+    def _faint(self, named: list[Stand]) -> bool:
+        """Whether names close little of what hardly stands out of the noise."""
+        closed = self.judge.base_m2 - self.judge.square(_chosen(named))
+        return self.judge.base_m2 < FAINT * self.floor_m2 and closed < 0.5 * self.judge.closable_m2
+
+    def _stood_in_for(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
+        """What names that leave too much most probably stand in for: something at their joint, or everywhere."""
+        if not named or unknown or self.analysis.given.groups or sufficient(self.judge, _chosen(named)) > 0.5:
+            return []
+        joints = {one.place.joint for one in named}
+        joint = joints.pop() if len(joints) == 1 else None
+        variable = "configuration" if joint is None else None
+        return [Stand(Place(UNKNOWN, joint=joint, variable=variable), (), (), 0.0)]
 
     def _strongest_first(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
         """Names in their order; before them what has no name and closes more than any: names must add to it then."""
@@ -437,7 +457,7 @@ def _causes(found: Findings) -> tuple[Cause, ...]:
 
 def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, tuple[Place, ...]]:
     if stand.unknown:
-        return UNKNOWN_PROBABILITY, (stand.place,)
+        return UNKNOWN_FIRST if stand is found.stands[0] else UNKNOWN_BESIDE, (stand.place,)
     if found.told:
         return 1.0, (stand.place,)
     if stand.groups[0] in found.analysis.given.groups:

@@ -222,8 +222,11 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Cho
     local = judge.local.get(variable, Chosen())
     spot = Spot(judge, here, local, elsewhere)
     named = _names(spot)
-    if not named and small.groups and judge.square(joined(elsewhere, here, small)) < AT_FLOOR * judge.floor_m2:
-        # Small causes at the same place are real where they complete the others down to the noise.
+    first = judge.problem.candidates[here.groups[spot.order[0]]]
+    complete = small.groups and judge.square(joined(elsewhere, here, small)) < AT_FLOOR * judge.floor_m2
+    if not named and complete and not _smooth(first):
+        # Small causes at the same place are real where they complete the others down to the noise; but smooth
+        # functions of one joint together imitate any other.
         named = _names(replace(spot, elsewhere=joined(elsewhere, small)))
     if named:
         return named

@@ -78,8 +78,13 @@ def adequate(judge: Judge, named: Chosen, everything: Chosen) -> float:
     closed = judge.square(Chosen()) - judge.square(named)
     possible = judge.square(Chosen()) - judge.square(everything)
     share = float(np.clip(closed / max(possible, 1e-300), 0.0, 1.0))
-    apart = float(expit((closed / judge.closable_m2 - CLOSES_AT) / CLOSES_WIDTH))
-    return share * (LEAST + (MOST - LEAST) * apart)
+    return share * (LEAST + (MOST - LEAST) * sufficient(judge, named))
+
+
+def sufficient(judge: Judge, named: Chosen) -> float:
+    """How probable it is that nothing without a name is at work, from the share of the gap that names close, 0..1."""
+    closed = judge.square(Chosen()) - judge.square(named)
+    return float(expit((closed / judge.closable_m2 - CLOSES_AT) / CLOSES_WIDTH))
 
 
 def has_name(stand: Stand) -> float:
