@@ -229,10 +229,12 @@ def _best_prior(problem: Problem, floor_m2: float) -> tuple[Evidence, float, flo
     calibrated = (*best, Chosen())
     if not _geometry_strays(problem):
         return calibrated
-    drawn = _as_drawn(problem)
+    left = _kept_out_m2(problem, calibrated, KNOWN)
+    if left <= FAR_LEFT * floor_m2:
+        return calibrated
     # As drawn: data enough overcome any prior, and what is fitted along must not hide what is off.
-    left, with_geometry = _kept_out_m2(problem, calibrated, KNOWN), _kept_out_m2(problem, drawn, AS_CALIBRATED)
-    return drawn if left > FAR_LEFT * floor_m2 and with_geometry < GEOMETRY_CLOSES * left else calibrated
+    drawn = _as_drawn(problem)
+    return drawn if _kept_out_m2(problem, drawn, AS_CALIBRATED) < GEOMETRY_CLOSES * left else calibrated
 
 
 def _with_prior(problem: Problem, prior: float) -> tuple[float, Evidence, float, float, Found]:

@@ -151,37 +151,37 @@ class Spectrum:
         best = max((self.saw_near(1 / self.wave[k]) for k in places), default=(0.0, 0.0))
         return (best[1], self.sharp_phase(best[1])) if best[0] > 0 else None
 
-    def saw_near(self, step: float) -> tuple[float, float, float]:
-        """The best explained energy near a size of steps, with the size and the phase."""
-        best = (0.0, step, 0.0)
-        width = step**2 / self.span / 2
-        for size in step + width * np.linspace(-1, 1, STEPS_AROUND):
-            for phase in PHASES:
-                best = max(best, (self.explained(size, phase), float(size), phase))
-        return best
+    def saw_near(self, step: float) -> tuple[float, float]:
+        """The best explained energy near a size of steps, and the size."""
+        sizes = step + step**2 / self.span / 2 * np.linspace(-1, 1, STEPS_AROUND)
+        energy = self.best_energy(sizes)
+        best = int(np.argmax(energy))
+        return float(energy[best]), float(sizes[best])
 
-    def best_phase(self, step: float) -> tuple[float, float]:
-        """Energy that steps of a size explain at their best phase, and that phase."""
-        return max((self.explained(step, phase), phase) for phase in PHASES)
+    def best_energy(self, sizes: Array) -> Array:
+        """Energy that steps of each size (k,) explain at their best phase, (k,)."""
+        energy = self.explained(np.repeat(sizes, len(PHASES)), np.tile(PHASES, len(sizes)))
+        return energy.reshape(len(sizes), -1).max(axis=1)
 
     def sharp_phase(self, step: float) -> float:
         """The best phase of steps of a size, as finely as points can tell."""
-        best, width = self.best_phase(step), 1 / len(PHASES)
-        for _ in range(2):
-            near = best[1] + width * np.linspace(-1, 1, PHASES_AROUND)
-            best = max(best, *((self.explained(step, phase), float(phase)) for phase in near))
+        phases, width = np.array(PHASES), 1 / len(PHASES)
+        for _ in range(3):
+            best = phases[int(np.argmax(self.explained(np.full(len(phases), step), phases)))]
+            phases = np.append(best, best + width * np.linspace(-1, 1, PHASES_AROUND))
             width /= 8
-        return best[1]
+        return float(best)
 
-    def explained(self, step: float, phase: float) -> float:
-        """Energy that steps explain; 0 where a share of them does that is far from one.
+    def explained(self, steps: Array, phases: Array) -> Array:
+        """Energy that steps of each size and phase (k,) explain; 0 where a share of them does that is far from one.
 
         Such a share of other steps may look alike at the few places where a joint stood, and is none.
         """
-        teeth = drives.saw(self.x, step, phase)
-        teeth -= teeth @ self.strength / self.strength.sum()
-        pull, square = float(teeth @ self.error), max(float(teeth**2 @ self.strength), 1e-300)
-        return pull**2 / square if SHARES[0] < pull / square < SHARES[1] else 0.0
+        teeth = drives.saw(self.x, steps[:, None], phases[:, None])
+        teeth -= (teeth @ self.strength / self.strength.sum())[:, None]
+        pull, square = teeth @ self.error, np.maximum(teeth**2 @ self.strength, 1e-300)
+        whole = (pull / square > SHARES[0]) & (pull / square < SHARES[1])
+        return np.where(whole, pull**2 / square, 0.0)
 
 
 def _whole_steps(wave: Array, power: Array, amplitude: Array, most: int) -> np.ndarray:
@@ -218,11 +218,11 @@ def _alike(spectra: list[Spectrum], size: float) -> dict[int, tuple[float, float
 def _alike_near(spectra: list[Spectrum], step: float) -> tuple[float, float]:
     """Steps of one size, counted alike, near a size: the energy that they explain, and the size."""
     farthest = max(float(np.abs(spectrum.x).max()) for spectrum in spectra)
-    best = (0.0, step)
     for width in (step**2 / min(spectrum.span for spectrum in spectra), step**2 / farthest):
-        for size in best[1] + width * np.linspace(-1, 1, ALIKE_AROUND):
-            best = max(best, (sum(spectrum.best_phase(size)[0] for spectrum in spectra), float(size)))
-    return best
+        sizes = step + width * np.linspace(-1, 1, ALIKE_AROUND)
+        energy = sum(spectrum.best_energy(sizes) for spectrum in spectra)
+        step = float(sizes[int(np.argmax(energy))])
+    return float(energy.max()), step
 
 
 def _neighbours(doings: Doings, one: Candidate, other: Candidate) -> bool:

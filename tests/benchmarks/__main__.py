@@ -17,7 +17,7 @@ def main() -> None:
 
         return withheld(sys.argv[2:])
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
-    parser.add_argument("what", choices=("axes", "speed", "poses", "planning", "dashboard", "sessions"))
+    parser.add_argument("what", choices=("axes", "speed", "poses", "planning", "dashboard", "sessions", "gap"))
     parser.add_argument("--sweeps", type=int, default=4000, help="simulated sweeps for each row of 'axes'")
     parser.add_argument("--poses", type=int, default=100_000, help="random poses for 'poses'")
     parser.add_argument("--seeds", type=int, default=100, help="simulated campaigns for each plan of 'planning'")
@@ -38,6 +38,10 @@ def main() -> None:
         from tests.benchmarks.session_speed import report as of_sessions
 
         print(of_sessions())
+    elif asked.what == "gap":
+        from tests.benchmarks.gap_speed import report as of_gap
+
+        print(of_gap())
     elif asked.what == "dashboard":
         from tests.benchmarks.dashboard import report as of_dashboard
 

@@ -160,7 +160,7 @@ def _coupling(source: int, joint: int, source_unit: str, own_unit: str) -> Candi
     return Candidate(Place("coupling", joint=joint + 1, source=source + 1), "", (name,), columns, reference=(ANGLE,))
 
 
-def saw(x: Array, step: float, phase: float) -> Array:
+def saw(x: Array, step: float | Array, phase: float | Array) -> Array:
     """What rounding to whole steps does to x."""
     return step * np.round(x / step - phase) + step * phase - x
 
