@@ -1,7 +1,7 @@
 """How long a diagnosis of the gap takes, and how much memory, for campaigns of 1,000 to 20,000 points.
 
-Run by ``python -m tests.benchmarks gap``. Each campaign is the twin's L6, all of it off, with backlash and a drift beside; each
-diagnosis runs in a process of its own, so that its peak of memory is its own.
+Run by ``python -m tests.benchmarks gap``. Each campaign is the twin's L6, all of it off, with backlash and a drift
+beside; each diagnosis runs in a process of its own, so that its peak of memory is its own.
 """
 
 import multiprocessing
