@@ -19,7 +19,7 @@ from core.gap.evidence import Chosen, joined, without
 from core.gap.folds import blocks
 from core.gap.kept_out import KeptOut, mean_square
 from core.gap.observations import Observations, observe
-from core.gap.open_set import AT_FLOOR, EVERYWHERE, Judge, Stand, stands
+from core.gap.open_set import AT_FLOOR, EVERYWHERE, Judge, Stand, stands, unknown_at
 from core.gap.placement import placement_slots
 from core.gap.posterior import adequate, rivals, sufficient, twins
 from core.gap.problem import Problem
@@ -51,6 +51,8 @@ TOLD_SHARE = 0.01
 HOLD_OUT = "fifths of each arc and regions of the joint space, each predicted from the others"
 SURE_OF_REST = 0.1
 """What nameless functions must still close, as a share of the gap, to be told as something unknown."""
+MANY = 3
+"""Names that together leave too much: none of their joints is where something acts."""
 FAINT = 1.3
 """Times the noise (mean squares) of what does not stand out of it by itself."""
 CLOSED = 0.9
@@ -182,7 +184,9 @@ class Findings:
         if self._faint(order):
             order = []
         unknown = self._unknown([one for one in judged if one.unknown], order)
-        return [*self._stood_in_for(order, unknown), *self._strongest_first(order, unknown)]
+        if order and not self.analysis.given.groups and sufficient(self.judge, _chosen(order)) < 0.5:
+            return [*self._stood_in_for(order, unknown), *(self._adding(order, unknown) if unknown else order)]
+        return self._strongest_first(order, unknown)
 
     def _faint(self, named: list[Stand]) -> bool:
         """Whether names close little of what hardly stands out of the noise."""
@@ -191,27 +195,33 @@ class Findings:
 
     def _stood_in_for(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
         """What names that leave too much most probably stand in for: something at their joint, or everywhere."""
-        if not named or unknown or self.analysis.given.groups or sufficient(self.judge, _chosen(named)) > 0.5:
-            return []
-        joints = {one.place.joint for one in named}
-        joint = joints.pop() if len(joints) == 1 else None
-        variable = "configuration" if joint is None else None
-        return [Stand(Place(UNKNOWN, joint=joint, variable=variable), (), (), 0.0)]
+        lost = self._lost_m2([*named, *unknown])[len(named) :]
+        unknown = [unknown[k] for k in np.argsort(lost)[::-1]]
+        if unknown and len(named) < MANY:
+            return unknown
+        variables = {self.judge.variable(one.place) for one in named}
+        place = unknown_at(variables.pop() if len(variables) == 1 else "configuration")
+        same = [one for one in unknown if one.place.same_as(place)] or [Stand(place, (), (), 0.0)]
+        return [*same, *(one for one in unknown if not one.place.same_as(place))]
 
     def _strongest_first(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
         """Names in their order; before them what has no name and closes more than any: names must add to it then."""
-        everything = [*named, *unknown]
-        whole = self.judge.square(_chosen(everything))
-        lost = [self.judge.square(_chosen([o for o in everything if o is not one])) - whole for one in everything]
+        lost = self._lost_m2([*named, *unknown])
         most = max(lost[: len(named)], default=np.inf) + SURE_OF_REST * self.judge.closable_m2
         first = [one for one, m2 in zip(unknown, lost[len(named) :], strict=True) if m2 > most]
-        if first:
-            adds = (
-                self._is_given(one) or m2 > TOLD_SHARE * self.judge.closable_m2
-                for one, m2 in zip(named, lost, strict=False)
-            )
-            named = [one for one, kept in zip(named, adds, strict=True) if kept]
-        return [*first, *named, *(one for one in unknown if one not in first)]
+        told = self._adding(named, unknown) if first else named
+        return [*first, *told, *(one for one in unknown if one not in first)]
+
+    def _adding(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
+        """Names that add to what has none."""
+        least = TOLD_SHARE * self.judge.closable_m2
+        lost = self._lost_m2([*named, *unknown])
+        return [one for one, m2 in zip(named, lost, strict=False) if m2 > least or self._is_given(one)]
+
+    def _lost_m2(self, told: list[Stand]) -> list[float]:
+        """What each of several closes when all others are given, m^2."""
+        whole = self.judge.square(_chosen(told))
+        return [self.judge.square(_chosen([o for o in told if o is not one])) - whole for one in told]
 
     @cached_property
     def named(self) -> list[Stand]:

@@ -230,12 +230,15 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Cho
         named = _names(replace(spot, elsewhere=joined(elsewhere, small)))
     if named:
         return named
-    if not variable.startswith("joint"):
-        place = Place("unknown", variable=variable)
-    else:
-        place = Place("unknown", joint=int(variable.split()[1]))
     groups = joined(local, here)
-    return [Stand(place, groups.groups, groups.sizes, spot.share(spot.order[:1]))]
+    return [Stand(unknown_at(variable), groups.groups, groups.sizes, spot.share(spot.order[:1]))]
+
+
+def unknown_at(variable: str) -> Place:
+    """Something without a name at a joint, or on another variable."""
+    if variable.startswith("joint"):
+        return Place("unknown", joint=int(variable.split()[1]))
+    return Place("unknown", variable=variable)
 
 
 @dataclass(frozen=True, eq=False)

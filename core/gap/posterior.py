@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import expit
 
 from core.gap.evidence import Chosen, joined, without
-from core.gap.open_set import LOCALLY, Judge, Stand
+from core.gap.open_set import AT_FLOOR, LOCALLY, Judge, Stand
 from core.gap.result import Place
 from core.geometry import Array
 
@@ -82,9 +82,16 @@ def adequate(judge: Judge, named: Chosen, everything: Chosen) -> float:
 
 
 def sufficient(judge: Judge, named: Chosen) -> float:
-    """How probable it is that nothing without a name is at work, from the share of the gap that names close, 0..1."""
-    closed = judge.square(Chosen()) - judge.square(named)
-    return float(expit((closed / judge.closable_m2 - CLOSES_AT) / CLOSES_WIDTH))
+    """How probable it is that nothing without a name is at work, from the share of the gap that names close, 0..1.
+
+    Small causes that are found and not told count where all together leave no more than noise.
+    """
+    left = judge.square(named)
+    with_small = judge.square(joined(named, judge.found))
+    if with_small < AT_FLOOR * judge.floor_m2:
+        left = min(left, with_small)
+    closed = (judge.square(Chosen()) - left) / judge.closable_m2
+    return float(expit((closed - CLOSES_AT) / CLOSES_WIDTH))
 
 
 def has_name(stand: Stand) -> float:

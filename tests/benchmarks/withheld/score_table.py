@@ -194,7 +194,7 @@ def failed(outcome: Outcome) -> bool:
 def _failure(outcome: Outcome) -> tuple[str, ...]:
     truth = outcome.truth
     what = [str(truth["noise"])] if outcome.kind == "nothing" else [words(answer) for answer in outcome.answers]
-    what += {"thin": [f"({truth['protocol']})"], "other": [f"({truth['effects'][0]})"]}.get(outcome.kind, [])
+    what += {"thin": [f"({truth['protocol']})"], "other": [f"({', '.join(truth['effects'])})"]}.get(outcome.kind, [])
     said = "; ".join(f"{words(cause)} p={probability(cause):.2f}{_class(cause)}" for cause in outcome.causes[:4])
     said = said or (outcome.verdict.refused or outcome.verdict.crashed[-120:]).replace("\n", " ")
     return outcome.name, outcome.kind, str(truth["arm"]), f"{truth['gap']:g}", ", ".join(what), outcome.word, said
