@@ -13,17 +13,13 @@ from core.estimate import ArmEstimate, axis_basis
 from core.geometry import Array, Line, angle_between, common_normal, cross
 from core.motion_forms import MotionFunction
 from core.phi_convention import PARALLEL_SINE
-from core.phi_model import PhiModel
+from core.phi_model import PARAMETERS, PhiModel
 from core.robot import Robot
 
 SIGNIFICANT = 2.0
 """A deviation is significant beyond that many standard uncertainties."""
-PARAMETER_WORDS = {
-    "a_m": "offset a",
-    "b_m": "distance b",
-    "alpha_rad": "angle alpha",
-    "theta_rad": "angle theta",
-}
+NOTHING_M = 1e-6
+"""A length that is designed shorter than this is none."""
 
 
 @dataclass(frozen=True)
@@ -64,23 +60,46 @@ def findings(robot: Robot, nominal: PhiModel | None, estimate: ArmEstimate) -> t
     return tuple(sorted(found, key=lambda f: (not f.significant, f.std == 0, -abs(f.deviation) / max(f.std, 1e-15))))
 
 
+def meaning(frame: int, parameter: str, nominal: float) -> str:
+    """What differs where a parameter of a frame does: the length of a link, or the place or lean of the next axis.
+
+    Args:
+        frame: 1..n-1.
+        parameter: one of ``PARAMETERS``.
+        nominal: its designed value, m or rad.
+    """
+    if not parameter.endswith("_m"):
+        return f"axis {frame + 1} leans"
+    return f"axis {frame + 1} is shifted" if abs(nominal) < NOTHING_M else f"link {frame} is"
+
+
+def sense(parameter: str, nominal: float, deviation: float) -> str:
+    """How the actual size of a parameter, m or rad, compares with the designed one; empty: none is designed."""
+    larger = abs(nominal + deviation) >= abs(nominal)
+    if not parameter.endswith("_m"):
+        return "more" if larger else "less"
+    if abs(nominal) < NOTHING_M:
+        return ""
+    return "longer" if larger else "shorter"
+
+
 def _of_parameters(nominal: PhiModel, estimate: ArmEstimate) -> list[Finding]:
-    geometry, found = estimate.geometry, []
+    geometry = estimate.geometry
     difference = geometry.model.parameters - nominal.parameters
-    for i, row in enumerate(difference):
-        for k, (name, words) in enumerate(PARAMETER_WORDS.items()):
-            if geometry.std[i, k] > 0:
-                size = _signed(row[k], geometry.std[i, k], name)
-                found.append(
-                    Finding(
-                        f"frame {i + 1}: {words} is {size} off its design value",
-                        name,
-                        row[k],
-                        geometry.std[i, k],
-                        i + 1,
-                    )
-                )
-    return found
+    return [
+        _parameter_finding(int(i) + 1, name, nominal.parameters[i, k], (difference[i, k], geometry.std[i, k]))
+        for i, k in np.argwhere(geometry.std > 0)
+        for name in [PARAMETERS[k]]
+    ]
+
+
+def _parameter_finding(frame: int, parameter: str, nominal: float, deviation: tuple[float, float]) -> Finding:
+    size, std = deviation
+    compared = sense(parameter, nominal, size)
+    by = "" if compared in ("longer", "shorter") else "by "
+    text = f"{meaning(frame, parameter, nominal)} {by}{_plain(abs(size), std, parameter.rpartition('_')[2])}"
+    text += f" {compared} than designed" if compared else ""
+    return Finding(f"{text} ({parameter.rpartition('_')[0]} {frame})", parameter, size, std, frame)
 
 
 def _of_axis_pairs(robot: Robot, estimate: ArmEstimate) -> list[Finding]:
@@ -205,7 +224,3 @@ def _plain(value: float, std: float, unit: str) -> str:
     digits = 3 if std <= 0 else int(np.clip(1 - np.floor(np.log10(std)), 0, 4))
     error = f" +- {std:.{digits}f} {name}" if std > 0 else ""
     return f"{value:.{digits}f} {name}{error}"
-
-
-def _signed(value: float, std: float, parameter: str) -> str:
-    return ("+" if value >= 0 else "") + _plain(value, std, "m" if parameter.endswith("_m") else "rad")

@@ -11,6 +11,9 @@ from core.noise import Noise, is_stated
 
 MOST_DECIMALS = 7
 
+GREEK = {"alpha": "\N{GREEK SMALL LETTER ALPHA}", "theta": "\N{GREEK SMALL LETTER THETA}"}
+SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
 
 def display_unit(slides: bool) -> tuple[str, float]:
     """The unit in which displacements of a joint are shown, and how many of it make one SI unit."""
@@ -56,8 +59,20 @@ def typeset(text: str) -> str:
 
 
 def as_sentence(text: str) -> str:
-    """A finding as a sentence of its own."""
-    return typeset(f"{text[:1].upper()}{text[1:]}.")
+    """A finding as a sentence of its own; a parameter that it names is written as tables and pictures write it."""
+    named = re.sub(r"\b(a|b|alpha|theta) (\d+)(?=\)$)", lambda m: parameter_sign(m[1], int(m[2])), text)
+    return f"{typeset(with_capital(named))}."
+
+
+def with_capital(sentence: str) -> str:
+    """A sentence with a capital letter, unless it begins with a name: of a file, a column, a key."""
+    first = re.match(r"[a-z]+(?=[ ,:;]|$)", sentence)
+    return sentence if first is None else sentence[:1].upper() + sentence[1:]
+
+
+def parameter_sign(name: str, frame: int) -> str:
+    """``alpha`` of frame 2 as formulas write it, α₂."""
+    return GREEK.get(name, name) + str(frame).translate(SUBSCRIPTS)
 
 
 def two_digits(value: float) -> str:

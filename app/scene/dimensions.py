@@ -16,21 +16,12 @@ import numpy as np
 
 from app.scene.colours import round_down
 from core.estimate import Geometry
-from core.findings import SIGNIFICANT
+from core.findings import SIGNIFICANT, meaning, sense
 from core.geometry import Array, Line
 from core.phi_model import PARAMETERS, PhiModel, frames
 from core.phi_transforms import link_transform, phi_transform
-from core.wording import decimals_for, fixed, parameter_unit
+from core.wording import decimals_for, fixed, parameter_sign, parameter_unit
 
-SIGNS = {
-    "a_m": "a",
-    "b_m": "b",
-    "alpha_rad": "\N{GREEK SMALL LETTER ALPHA}",
-    "theta_rad": "\N{GREEK SMALL LETTER THETA}",
-}
-NOTHING_M = 1e-6
-"""A length that is designed shorter than this is none."""
-SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 LARGEST_ANGLE_RAD = np.deg2rad(75.0)
 """No exaggerated angle is drawn larger: beyond it one could no longer tell which way an axis leans."""
 
@@ -51,7 +42,7 @@ class Dimension:
     """Actual minus nominal, m or rad, as it is."""
     std: float
     text: str
-    """What it means, and the deviation with its uncertainty: link 2 too long: a₂ −3.10 ± 0.22 mm."""
+    """What it means, and the deviation with its uncertainty: link 2 is longer: a₂ −3.10 ± 0.22 mm."""
     significant: bool
 
     @property
@@ -95,7 +86,8 @@ def dimensions(
         for k, name in enumerate(PARAMETERS):
             if geometry.std[i, k] > 0:
                 ends = corners[k]
-                what = meaning(i + 1, name, float(nominal.parameters[i, k]), float(deviation[k]))
+                designed = float(nominal.parameters[i, k])
+                what = f"{meaning(i + 1, name, designed)} {sense(name, designed, float(deviation[k]))}".rstrip()
                 out.append(_dimension(i + 1, name, ends, float(deviation[k]), float(geometry.std[i, k]), what))
     return out
 
@@ -126,15 +118,6 @@ def sketches(nominal: PhiModel, geometry: Geometry, base: Array, exaggeration: f
             )
         )
     return out
-
-
-def meaning(frame: int, parameter: str, nominal: float, deviation: float) -> str:
-    """What a deviation, m or rad, means: which link is long or short, or which axis is shifted or leans."""
-    if not parameter.endswith("_m"):
-        return f"axis {frame + 1} leans"
-    if abs(nominal) < NOTHING_M:
-        return f"axis {frame + 1} shifted"
-    return f"link {frame} too {'long' if nominal * deviation > 0 else 'short'}"
 
 
 def fitting_exaggeration(nominal: PhiModel, geometry: Geometry, reach_m: float) -> float:
@@ -180,6 +163,6 @@ def _dimension(
     decimals = decimals_for(std * scale)
     sign = "+" if deviation >= 0 else ""
     value = f"{sign}{fixed(deviation * scale, decimals)} ± {fixed(std * scale, decimals)}"
-    name = f"{SIGNS[parameter]}{str(frame).translate(SUBSCRIPTS)}"
+    name = parameter_sign(parameter.rpartition("_")[0], frame)
     text = f"{what}: {name} {value}{'°' if unit == 'deg' else f' {unit}'}"
     return Dimension(frame, parameter, *ends, deviation, std, text, bool(abs(deviation) > SIGNIFICANT * std))

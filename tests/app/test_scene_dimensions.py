@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from app.scene.diagnosis import label_places
-from app.scene.dimensions import LARGEST_ANGLE_RAD, dimensions, fitting_exaggeration, meaning, sketches
+from app.scene.dimensions import LARGEST_ANGLE_RAD, dimensions, fitting_exaggeration, sketches
 from core.estimate import Geometry
+from core.findings import meaning, sense
 from core.phi_model import PARAMETERS, frames
 from core.phi_transforms import link_transform, phi_transform
 from core.twin import irb_l6
@@ -28,19 +29,33 @@ def test_what_is_fixed_by_agreement_has_no_dimension() -> None:
 def test_deviation_std_text_and_significance() -> None:
     d = found()[2, "a_m"]
     assert d.deviation == pytest.approx(-3.1e-3)
-    assert d.text == "link 2 too long: a₂ −3.10 ± 0.20 mm"
+    assert d.text == "link 2 is longer: a₂ −3.10 ± 0.20 mm"
     assert d.significant
-    assert found()[2, "alpha_rad"].text == "axis 3 leans: α₂ −0.1720 ± 0.0057°"
-    assert found()[3, "theta_rad"].text == "axis 4 leans: θ₃ +0.010 ± 0.011°"
+    assert found()[2, "alpha_rad"].text == "axis 3 leans less: α₂ −0.1720 ± 0.0057°"
+    assert found()[3, "theta_rad"].text == "axis 4 leans less: θ₃ +0.010 ± 0.011°"
     assert not found()[3, "theta_rad"].significant
 
 
 def test_a_deviation_says_what_it_means() -> None:
-    assert meaning(2, "a_m", -0.69, -0.003) == "link 2 too long"
-    assert meaning(2, "a_m", -0.69, 0.003) == "link 2 too short"
-    assert meaning(3, "a_m", 0.67, 0.003) == "link 3 too long"
-    assert meaning(2, "b_m", 0.0, 0.003) == "axis 3 shifted"
-    assert meaning(5, "theta_rad", 0.0, 0.003) == "axis 6 leans"
+    said = [
+        f"{meaning(frame, name, nominal)} {sense(name, nominal, deviation)}".rstrip()
+        for frame, name, nominal, deviation in (
+            (2, "a_m", -0.69, -0.003),
+            (2, "a_m", -0.69, 0.003),
+            (3, "a_m", 0.67, 0.003),
+            (2, "b_m", 0.0, 0.003),
+            (5, "theta_rad", 0.0, 0.003),
+            (4, "alpha_rad", np.pi / 2, -0.003),
+        )
+    ]
+    assert said == [
+        "link 2 is longer",
+        "link 2 is shorter",
+        "link 3 is longer",
+        "axis 3 is shifted",
+        "axis 6 leans more",
+        "axis 5 leans less",
+    ]
 
 
 @pytest.mark.parametrize("frame", range(2, 6))

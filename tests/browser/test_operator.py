@@ -1,10 +1,12 @@
 """The less smooth ways of an operator in a real browser: wrong inputs, pauses, any order, clicks in 3-D, two seats."""
 
+import contextlib
 import re
 
 import numpy as np
 import pytest
 from test_dashboard import (  # noqa: F401
+    LIST_MS,
     READY,
     choose,
     chromium,
@@ -12,6 +14,7 @@ from test_dashboard import (  # noqa: F401
     folder,
     group,
     measure,
+    playwright,
     press,
     started,
     tab,
@@ -27,6 +30,9 @@ PROJECT = """p => { const m = __viserMutable, v = m.camera.position.clone().set(
   v.applyMatrix4(m.nodeRefFromName['/points'].matrixWorld).project(m.camera);
   const r = m.canvas.getBoundingClientRect();
   return [r.left + (v.x + 1) / 2 * r.width, r.top + (1 - v.y) / 2 * r.height] }"""
+
+POINTED_AT = "() => document.querySelector('canvas[data-engine]').style.cursor === 'pointer'"
+CHOSEN = "() => document.querySelector('[data-testid=shot]').innerText.includes('chosen')"
 
 LAYOUT = """() => {
   const wrong = [], shown = e => e.offsetParent && e.getBoundingClientRect().width > 0;
@@ -181,10 +187,11 @@ def click_a_shot(page, dashboard) -> int:
     for shot in bench.state.shots[40:100:6]:
         x, y = page.evaluate(PROJECT, list(shot.taken.point_m))
         page.mouse.move(x, y)
-        page.wait_for_timeout(300)
-        page.mouse.click(x, y)
-        page.wait_for_timeout(400)
-        if "chosen" in page.get_by_test_id("shot").inner_text():
+        # Another shot may lie in front of this one, or the arm: the next one is tried then.
+        with contextlib.suppress(playwright.TimeoutError):
+            page.wait_for_function(POINTED_AT, timeout=LIST_MS)
+            page.mouse.click(x, y)
+            page.wait_for_function(CHOSEN, timeout=LIST_MS)
             record = int(re.search(r"Record (\d+)", page.get_by_test_id("shot").inner_text())[1])
             return next(one.id for one in bench.state.shots if one.record == record)
     raise AssertionError("no shot could be clicked")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_dashboard import chromium, group, press, started, tab, visit, wait_for_text  # noqa: F401
+from test_dashboard import choose, chromium, folder, group, press, started, tab, visit, wait_for_text  # noqa: F401
 
 from core.pose_visits import pose_visits
 from core.session_store import SUFFIX
@@ -135,8 +135,7 @@ def test_before_and_after_are_switched_in_3d(page, dashboard):
     page.wait_for_function(NODE, arg="/pose_errors/after/arrows")
     assert page.evaluate(NODE, "/pose_errors/before/arrows")
     for chosen, gone, there in (("after", "before", "after"), ("before", "after", "before")):
-        page.get_by_label("Errors", exact=True).filter(visible=True).click()
-        page.get_by_role("option", name=chosen, exact=True).click()
+        choose(page, "Errors", chosen)
         page.wait_for_function(f"name => !({NODE})(name)", arg=f"/pose_errors/{gone}/arrows")
         page.wait_for_function(NODE, arg=f"/pose_errors/{there}/arrows")
 
@@ -181,7 +180,7 @@ def test_a_new_session_takes_the_tab_away(page, dashboard):
     press(page, "Measure pose")
     wait_for_text(page, "verify-step", "Pose 2 of 12")
     tab(page, "1 Cell")
-    page.get_by_text("New session", exact=True).filter(visible=True).last.click()
+    folder(page, "New session")
     press(page, "Begin")
     page.get_by_role("tab", name="Verify").wait_for(state="detached")
     page.get_by_role("tab", name="Poses").wait_for(state="detached")
