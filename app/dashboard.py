@@ -42,6 +42,8 @@ THEME = {"show_logo": False, "show_share_button": False, "brand_color": (0, 114,
 DARK = {"brand_color": (86, 180, 233)}
 """The dark blue would hardly be read on a dark page."""
 
+WAITS = "This is done when the run ends. Pause or Stop ends it sooner."
+
 
 class Dashboard:
     """A running dashboard on one session."""
@@ -116,6 +118,9 @@ class Dashboard:
         client = getattr(event, "client", None)
         if operator and not self._may(event):
             return
+        if not at_once and client is not None and self.bench.runs.running is not None:
+            # Nothing looks worse than a button that does nothing.
+            client.add_notification("The robot is at work", WAITS, color="blue", auto_close_seconds=8)
         ask = self.jobs.at_once if at_once else self.jobs.ask
         ask(lambda: job(client), lambda sentence: self.say(client, sentence))
 

@@ -78,6 +78,32 @@ def test_solving_does_not_wait_for_the_robot_to_finish_and_the_solution_is_of_al
         dashboard.stop()
 
 
+def test_what_waits_for_the_robot_says_so(tmp_path):
+    """Nothing looks worse than a button that does nothing; what does not wait says nothing."""
+    session = Session.create(tmp_path / f"run{SUFFIX}", demo_events(irb_l6.cell()), by="A. Operator")
+    dashboard = Dashboard(Workbench(session), port=0)
+    told, done = [], []
+    client = SimpleNamespace(client_id=1, add_notification=lambda title, *args, **kwargs: told.append(title))
+    try:
+        dashboard.seat.may = lambda client_id: True
+        dashboard.ask(SimpleNamespace(client=client), lambda one: done.append("idle"))
+        dashboard.jobs.wait()
+        assert (told, done) == ([], ["idle"])
+        dashboard.bench.robot._seconds = 0.02
+        dashboard.acquire._start(None, True)
+        until(lambda: dashboard.bench.runs.running is not None)
+        dashboard.ask(SimpleNamespace(client=client), lambda one: done.append("at once"), at_once=True)
+        assert (told, done) == ([], ["idle", "at once"])
+        dashboard.ask(SimpleNamespace(client=client), lambda one: done.append("later"))
+        assert told == ["The robot is at work"]
+        assert "later" not in done
+        dashboard.acquire.stop(None)
+        dashboard.jobs.wait()
+        assert done[-1] == "later"
+    finally:
+        dashboard.stop()
+
+
 def test_a_diagnosis_ends_with_its_tab(dashboard):
     dashboard.gap.panel._diagnose(SimpleNamespace(client=None))
     dashboard.jobs.wait()
