@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from app.figures.sheet import Panel, stacked
 from app.figures.style import BLUE, GREY, SKY, VERMILLION, WIDE_PX, Trace, plain
 from core.gap.place_words import cause_words
-from core.gap.result import GapReport
+from core.gap.result import UNKNOWN, GapReport
 from core.gap.verdict_words import length_words
 
 ROW_PX = 36
@@ -20,7 +20,7 @@ MOST_CAUSES = 8
 """With a bar of their own."""
 SAME = 0.02
 """Lengths that differ by less are drawn as one."""
-TOGETHER = "Left with all of them"
+TOGETHER, NAMED_ONLY = "Left with all of them", "Left by the corrected sim: causes that have a name"
 FLOOR_NAMES = {
     "repeats": "Floor: repeated measurements scatter so",
     "sigma": "Floor: the instrument's noise",
@@ -37,7 +37,8 @@ def gap_steps_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure:
         names.append(f"+ {len(report.causes) - len(causes)} other causes")
         steps.append(report.causes[-1].gap_after_rms_m)
     if abs(report.left_rms_m - steps[-1]) > SAME * report.left_rms_m:
-        names.append(TOGETHER)
+        unnamed = any(cause.place.effect == UNKNOWN for cause in report.causes)
+        names.append(NAMED_ONLY if unnamed else TOGETHER)
         steps.append(report.left_rms_m)
     names = _apart([_lines(name, width_px // 17) for name in [*names, FLOOR_NAMES[report.noise.floor_source]]])
     values = np.array([*steps, report.noise.floor_rms_m]) * 1e3
