@@ -139,7 +139,8 @@ def _facts(report: GapReport) -> tuple[tuple[str, str], ...]:
 
 
 def _shrinks(report: GapReport) -> Section:
-    plot = Plot(gap_steps_figure(report), "Every bar holds the causes above it. Dotted: the floor. What has no name cannot be put into a sim.")
+    note = "Every bar holds the causes above it. Dotted: the floor. What has no name cannot be put into a sim."
+    plot = Plot(gap_steps_figure(report), note)
     text = (
         f"Kept out of the fits: {report.hold_out.strip().rstrip('.')}.",
         *([left_sentence(report)] if report.causes else []),
