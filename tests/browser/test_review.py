@@ -51,7 +51,7 @@ def page(chromium, dashboard):  # noqa: F811
     one.close()
 
 
-def until(condition, seconds: float = 15.0) -> None:
+def until(condition, seconds: float = 30.0) -> None:
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "it did not happen"

@@ -173,10 +173,20 @@ def opened(request: pytest.FixtureRequest, browser) -> Iterator:
     assert complaints == []
 
 
-def until(condition: Callable[[], bool], seconds: float = 8.0) -> None:
-    """Wait for something to become true."""
+class NoNodeError(AssertionError):
+    """A node is not in the scene, or not yet."""
+
+
+def until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
+    """Wait for something to become true, in nodes that may only just be on their way to the browser."""
     end = time.monotonic() + seconds
-    while not condition():
+    while True:
+        try:
+            if condition():
+                return
+        except NoNodeError:
+            if time.monotonic() > end:
+                raise
         assert time.monotonic() < end, "it did not happen"
         time.sleep(0.05)
 
@@ -190,7 +200,8 @@ def look(demo: Demo, page, name: str | Camera, seconds: float = 0.0) -> None:
 def world(page, name: str) -> np.ndarray:
     """The pose of a node in the browser, (4, 4)."""
     elements = page.evaluate(WORLD, name)
-    assert elements is not None, f"there is no node {name}"
+    if elements is None:
+        raise NoNodeError(f"there is no node {name}")
     return np.array(elements).reshape(4, 4).T
 
 
