@@ -37,6 +37,7 @@ from app.verify_tabs import VerifyTabs
 from app.words import STYLE
 from app.workbench import Workbench
 from core.errors import InputError
+from core.wording import with_capital
 
 THEME = {"show_logo": False, "show_share_button": False, "brand_color": (0, 114, 178)}
 DARK = {"brand_color": (86, 180, 233)}
@@ -136,7 +137,7 @@ class Dashboard:
         """Tell whoever asked, or everybody, what went wrong."""
         for one in [client] if client is not None else self.server.get_clients().values():
             with contextlib.suppress(Exception):
-                one.add_notification("This was not done", sentence, color="red", auto_close_seconds=15)
+                one.add_notification("This was not done", with_capital(sentence), color="red", auto_close_seconds=15)
 
     def _refuse(self, client_id: int, sentence: str) -> None:
         """Tell a browser that what it sent is not taken."""

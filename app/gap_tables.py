@@ -117,6 +117,13 @@ def shown_outliers(report: GapReport) -> ShownTable:
     return ShownTable("The largest first", headings, aligned([rows]), note)
 
 
+def probability_words(probability: float) -> str:
+    """A probability as per cent; none is said to be impossible or certain."""
+    if probability < 0.01:
+        return "< 1 %"
+    return "> 99 %" if probability > 0.99 else percent(probability)
+
+
 def cause_parameters(cause: Cause) -> str:
     """The clearest estimates of a cause in units of people, with their uncertainties."""
     ranked = sorted(range(len(cause.parameters)), key=lambda k: -_clearness(cause.parameters[k]))
@@ -137,7 +144,7 @@ def _cause_row(number_: int, cause: Cause) -> list[Cell]:
     return [
         count(number_),
         Cell(place_words(cause.place)),
-        Cell(percent(cause.probability), numeric=True),
+        Cell(probability_words(cause.probability), numeric=True),
         Cell(either_of(others) or NOWHERE, mark="" if others else "muted"),
         Cell(cause_parameters(cause) or NOWHERE),
         number(cause.gap_before_rms_m * 1e3),

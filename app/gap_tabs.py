@@ -49,5 +49,4 @@ class GapTabs:
 
     def show_dark(self, dark: bool) -> None:
         """Draw for a dark or a light page."""
-        if self._plots.there:
-            self.panel.show_dark(dark)
+        self.panel.show_dark(dark)

@@ -3,7 +3,7 @@
 from html import escape
 
 from app.gap_bench import Diagnosed
-from app.gap_tables import cause_parameters
+from app.gap_tables import cause_parameters, probability_words
 from app.words import block
 from core.gap.ledger import closed_share
 from core.gap.place_words import either_of, place_words
@@ -61,8 +61,9 @@ def causes_words(report: GapReport) -> str:
     """Every cause with its probability, class and size."""
     if not report.causes:
         return ""
-    heads = ("", "Cause", "Prob.", "Alone")
-    head = "".join(f"<th{NUMBER if k > 1 else ''}>{text}</th>" for k, text in enumerate(heads))
+    chance = "<abbr title='How probable it is that this is the cause'>Prob.</abbr>"
+    alone = "<abbr title='Share of the gap that this cause closes by itself'>Alone</abbr>"
+    head = f"<th></th><th>Cause</th><th{NUMBER}>{chance}</th><th{NUMBER}>{alone}</th>"
     body = "".join(_cause_row(number, cause) for number, cause in enumerate(report.causes, 1))
     return block(f"<h3>Causes</h3><table><tr>{head}</tr>{body}</table>", "gap-causes")
 
@@ -95,8 +96,9 @@ def _cause_row(number: int, cause: Cause) -> str:
         name += f"<br><span class='doubt'>or {_text(either_of(others))}</span>"
     size = cause_parameters(cause)
     name += f"<br><span class='soft'>{_text(size)}</span>" if size else ""
-    chances = "".join(f"<td{NUMBER}>{percent(share)}</td>" for share in (cause.probability, cause.share_closed))
-    return f"<tr><td>{number}</td><td>{name}</td>{chances}</tr>"
+    chances = (probability_words(cause.probability), percent(cause.share_closed))
+    numbers = "".join(f"<td{NUMBER}>{_text(words)}</td>" for words in chances)
+    return f"<tr><td>{number}</td><td>{name}</td>{numbers}</tr>"
 
 
 def _text(text: str) -> str:

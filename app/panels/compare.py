@@ -24,6 +24,7 @@ class ComparePanel:
         self._why_not = ""
         self._drawn: Comparison | None = None
         self._boxes: tuple[PlotBox, PlotBox] | None = None
+        self._dark = False
         self._there = False
 
     def build(self, gui: viser.GuiApi) -> None:
@@ -41,7 +42,8 @@ class ComparePanel:
 
     def build_plots(self, gui: viser.GuiApi) -> None:
         """Fill the tab at the right."""
-        self._boxes = PlotBox(gui, "compare-positions", ""), PlotBox(gui, "compare-orientations", "")
+        names = ("compare-positions", "compare-orientations")
+        self._boxes = tuple(PlotBox(gui, name, "", self._dark) for name in names)
         self._table = gui.add_html("")
         self._drawn = None
         self._bring.content = bringing("Methods")
@@ -57,7 +59,8 @@ class ComparePanel:
         self._bring.content = ""
 
     def show_dark(self, dark: bool) -> None:
-        """Draw for a dark or a light page."""
+        """Draw for a dark or a light page, also plots that come later."""
+        self._dark = dark
         for box in self._boxes or ():
             box.show_dark(dark)
 

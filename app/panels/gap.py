@@ -39,6 +39,7 @@ class GapPanel:
         self._plotted: Diagnosed | None = None
         self._switches: list[tuple[Switch, viser.GuiCheckboxHandle]] = []
         self._plots: dict[str, PlotBox] = {}
+        self._dark = False
         self._there = False
 
     def build(self, gui: viser.GuiApi) -> None:
@@ -68,14 +69,15 @@ class GapPanel:
         """Fill the tab at the right."""
         self._plotted = None
         self._plots = {
-            "steps": PlotBox(gui, "gap-steps", "Diagnose to see how far the gap shrinks."),
-            "map": PlotBox(gui, "gap-map", ""),
-            "space": PlotBox(gui, "gap-space", ""),
-            "records": PlotBox(gui, "gap-records", ""),
+            "steps": PlotBox(gui, "gap-steps", "Diagnose to see how far the gap shrinks.", self._dark),
+            "map": PlotBox(gui, "gap-map", "", self._dark),
+            "space": PlotBox(gui, "gap-space", "", self._dark),
+            "records": PlotBox(gui, "gap-records", "", self._dark),
         }
 
     def show_dark(self, dark: bool) -> None:
-        """Draw for a dark or a light page."""
+        """Draw for a dark or a light page, also plots that come later."""
+        self._dark = dark
         for box in self._plots.values():
             box.show_dark(dark)
 

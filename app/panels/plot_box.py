@@ -15,16 +15,17 @@ WIDTH_PX = 520
 class PlotBox:
     """One place of a panel."""
 
-    def __init__(self, gui: viser.GuiApi, name: str, empty: str) -> None:
+    def __init__(self, gui: viser.GuiApi, name: str, empty: str, dark: bool = False) -> None:
         """An empty box.
 
         Args:
             gui: of the server, within the panel or tab that holds it.
             name: for tests.
             empty: what to do to see something here.
+            dark: whether the page is dark.
         """
         self._name, self._empty = name, empty
-        self._dark, self._figure = False, go.Figure(layout={"template": "none"})
+        self._dark, self._figure = dark, go.Figure(layout={"template": "none"})
         self._plot = gui.add_plotly(self._figure, aspect=0.8, config=CONFIG, visible=False)
         self._words = gui.add_html("")
         self.clear()

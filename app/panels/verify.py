@@ -45,6 +45,7 @@ class VerifyPanel:
         self._drawn: tuple = ()
         self._scene: tuple = ()
         self._plots: tuple[PlotBox, PlotBox] | None = None
+        self._dark = False
         view.on_click(self._clicked)
 
     def build(self, gui: viser.GuiApi) -> None:
@@ -74,14 +75,15 @@ class VerifyPanel:
     def build_plots(self, gui: viser.GuiApi) -> None:
         """Fill the tab at the right."""
         self._plots = (
-            PlotBox(gui, "pose-positions", "Measure a test pose to see its error."),
-            PlotBox(gui, "pose-orientations", ""),
+            PlotBox(gui, "pose-positions", "Measure a test pose to see its error.", self._dark),
+            PlotBox(gui, "pose-orientations", "", self._dark),
         )
         self._table, self._iso = gui.add_html(""), gui.add_html("")
         self._drawn = ()
 
     def show_dark(self, dark: bool) -> None:
-        """Draw for a dark or a light page."""
+        """Draw for a dark or a light page, also plots that come later."""
+        self._dark = dark
         for box in self._plots or ():
             box.show_dark(dark)
 

@@ -15,7 +15,7 @@ from app.figures.gap_vectors import gap_vectors_figure, magnification
 from app.figures.gap_where import gap_records_figure, gap_shares_figure
 from app.figures.reliability import reliability_figure
 from app.gap_report import gap_html, gap_page
-from app.gap_tables import cause_parameters, shown_limits
+from app.gap_tables import cause_parameters, probability_words, shown_limits
 from core.gap.ledger import difference_with, switches
 from core.gap.result import DetectionLimit, Parameter, Place
 from core.gap.verdict_words import verdict_sentence
@@ -219,3 +219,10 @@ def test_limits_of_couplings_stand_under_the_joint_that_follows() -> None:
     assert [cell.text for cell in table.groups[0][0]] == [
         *("coupling from joint 2, to", "ppm", "1000", "", "3000", "4000", "", ""),
     ]
+
+
+@pytest.mark.parametrize(
+    ("probability", "words"), [(0.0, "< 1 %"), (0.004, "< 1 %"), (0.5, "50 %"), (0.97, "97 %"), (1.0, "> 99 %")]
+)
+def test_no_cause_is_said_to_be_impossible_or_certain(probability: float, words: str) -> None:
+    assert probability_words(probability) == words

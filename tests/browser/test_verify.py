@@ -16,6 +16,8 @@ PROJECT = """p => { const m = __viserMutable, top = m.nodeRefFromName['/pose_fra
   const r = m.canvas.getBoundingClientRect();
   return [r.left + (v.x + 1) / 2 * r.width, r.top + (1 - v.y) / 2 * r.height] }"""
 PLACE = "name => { const p = __viserMutable.nodeRefFromName[name].position; return [p.x, p.y, p.z] }"
+INKS = """() => [...document.querySelectorAll('.js-plotly-plot')].filter(p => p.offsetParent !== null)
+  .map(p => p._fullLayout.font.color)"""
 NODE = "name => !!__viserMutable.nodeRefFromName[name]"
 TRACES = """() => [...document.querySelectorAll('.js-plotly-plot')].filter(p => p.offsetParent !== null)
   .map(p => p._fullData.filter(t => t.mode === 'markers').map(t => [t.name, [...t.y].length]))"""
@@ -138,6 +140,19 @@ def test_before_and_after_are_switched_in_3d(page, dashboard):
         choose(page, "Errors", chosen)
         page.wait_for_function(f"name => !({NODE})(name)", arg=f"/pose_errors/{gone}/arrows")
         page.wait_for_function(NODE, arg=f"/pose_errors/{there}/arrows")
+
+
+def test_plots_of_tabs_that_come_late_can_be_read_on_a_dark_page(page, dashboard):
+    tab(page, "View")
+    page.get_by_label("Dark theme", exact=True).filter(visible=True).check()
+    page.wait_for_function("() => document.documentElement.dataset.mantineColorScheme === 'dark'")
+    solve(page)
+    dashboard.verify._poses.run()
+    tab(page, "Poses")
+    page.wait_for_function(f"() => ({TRACES})().length === 2")
+    inks = page.evaluate(INKS)
+    assert len(inks) == 2
+    assert all(min(bytes.fromhex(ink.lstrip("#"))) > 0xA0 for ink in inks), inks
 
 
 def test_limits_give_a_verdict_and_undo_takes_shots_back(page, dashboard):

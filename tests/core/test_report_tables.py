@@ -8,7 +8,7 @@ import pytest
 
 from core.calibration import Calibration
 from core.report import Table, tables
-from core.wording import decimals_for, fixed, is_simulated, summary, typeset, with_uncertainty
+from core.wording import decimals_for, fixed, is_simulated, summary, typeset, with_capital, with_uncertainty
 from tests.app.report_cases import NAMED, families_compared, six_joints, two_joints_swept, with_outliers, with_slide
 
 
@@ -148,3 +148,17 @@ def test_the_summary_is_short_and_names_what_is_missing(case):
 def test_only_what_says_so_is_simulated():
     assert is_simulated(six_joints().campaign)
     assert not is_simulated(NAMED["one joint, two turns"]().campaign)
+
+
+@pytest.mark.parametrize(
+    ("said", "shown"),
+    [
+        ("joint 3, sweep 1: expected a number", "Joint 3, sweep 1: expected a number"),
+        ("robot.toml, joint 2: no limits", "robot.toml, joint 2: no limits"),
+        ("sigma_mm is 0, expected more", "sigma_mm is 0, expected more"),
+        ("The disk is full.", "The disk is full."),
+        ("", ""),
+    ],
+)
+def test_sentences_begin_with_a_capital_unless_with_a_name(said: str, shown: str) -> None:
+    assert with_capital(said) == shown
