@@ -25,7 +25,7 @@ SOURCES = {
 
 def intro_words(bench: Workbench) -> str:
     """What this step is for and what comes next."""
-    warnings = "".join(f"<p class='bad'>{escape(text)}</p>" for text in bench.state.warnings)
+    warnings = "".join(f"<p class='bad'>{escape(with_capital(text))}</p>" for text in bench.state.warnings)
     read_only = bench.session.why_read_only
     warnings += f"<p class='bad'>Read-only: {escape(read_only)}. Nothing can be changed here.</p>" if read_only else ""
     return block(

@@ -20,8 +20,8 @@ class GapView:
     def __init__(self, viewer: Viewer) -> None:
         self._viewer = viewer
         self._top = SceneGroup(viewer, "/gap")
-        self._before = ErrorVectors(viewer, "/gap/as_it_is", 1.0, VERMILLION)
-        self._after = ErrorVectors(viewer, "/gap/with_causes", 1.0, BLUE)
+        self._before = ErrorVectors(viewer, "/gap/as_it_is", 1.0, VERMILLION, "gap")
+        self._after = ErrorVectors(viewer, "/gap/with_causes", 1.0, BLUE, "gap left")
 
     def show(self, report: GapReport | None, added: int) -> None:
         """Draw the arrows of a diagnosis.

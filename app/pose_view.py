@@ -37,8 +37,8 @@ class PoseView:
         self.points = PointsView(viewer, "/poses", radius_m=0.013)
         self._top = SceneGroup(viewer, "/pose_errors")
         self._errors = {
-            Shown.BEFORE: ErrorVectors(viewer, "/pose_errors/before", 1.0, VERMILLION),
-            Shown.AFTER: ErrorVectors(viewer, "/pose_errors/after", 1.0, BLUE),
+            Shown.BEFORE: ErrorVectors(viewer, "/pose_errors/before", 1.0, VERMILLION, "pose errors"),
+            Shown.AFTER: ErrorVectors(viewer, "/pose_errors/after", 1.0, BLUE, "pose errors left"),
         }
         self._frames = SceneGroup(viewer, "/pose_frames")
         self._drawn: list = []

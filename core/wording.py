@@ -54,7 +54,7 @@ def with_uncertainty(value: float, std: float, unit: str = "") -> str:
 
 def typeset(text: str) -> str:
     """A sentence of plain ASCII with the signs that print uses, and a unit that is said twice said once."""
-    text = text.replace(" +- ", " ± ").replace(" -", " \N{MINUS SIGN}")
+    text = text.replace("+- ", "± ").replace(" -", " \N{MINUS SIGN}")
     return re.sub(r" (mm|deg|%) ± ([0-9.]+) \1", r" ± \2 \1", text)
 
 

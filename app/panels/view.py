@@ -8,7 +8,17 @@ import numpy as np
 
 from app.cell_view import CellView
 from app.scene.cameras import fly_to
-from app.scene.colours import BLUE, FITTED_AXIS, NOMINAL_AXIS, VERMILLION, hex_of
+from app.scene.colours import (
+    BLUE,
+    ERROR_VECTOR,
+    FITTED_AXIS,
+    GHOST,
+    HIGHLIGHT,
+    NOMINAL_AXIS,
+    VERMILLION,
+    Rgb,
+    hex_of,
+)
 from app.spots import Spot
 from app.words import block
 
@@ -28,6 +38,16 @@ DIFFERENCES = (
     "arrow leads from the design to what is there, as many times too large as is written above it; its label has the "
     "true value with its standard uncertainty. Click a finding or a row of the table to come close.</p>"
 )
+KEY: tuple[tuple[str, Rgb, str], ...] = (
+    ("➜", ERROR_VECTOR, "residual of a shot"),
+    ("➜", VERMILLION, "gap, or error of a pose, as it is"),
+    ("➜", BLUE, "what is left of it"),
+    ("━", FITTED_AXIS, "fitted axis"),
+    ("━", GHOST, "nominal arm, sight lines"),
+    ("◎", HIGHLIGHT, "now, or chosen"),
+)
+"""What else has a colour in 3-D: sign, colour, meaning."""
+SHAPES = "Balls: shots. Diamonds: doubtful shots and test poses. Cages: shots left out."
 JOINT = "Joint "
 """Before the number of a joint in the name of its view."""
 WIDEST = 720.0
@@ -85,6 +105,7 @@ class ViewPanel:
                 for step in self._cell.scale.legend()
             )
             words = f"<h3>Radial residual of a shot</h3><p>{steps}</p>"
+            words += f"<p>{_key()}</p><p class='soft'>{SHAPES}</p>"
             words += (
                 "<p class='soft'>Tubes about the axes: one standard uncertainty, drawn "
                 f"{self._cell.tube_exaggeration:g} times too wide.</p>"
@@ -158,3 +179,11 @@ def _within(slider: "viser.GuiSliderHandle") -> float:
     value = slider.value
     known = isinstance(value, int | float) and np.isfinite(value)
     return float(np.clip(value, slider.min, slider.max)) if known else float(slider.min)
+
+
+def _key() -> str:
+    """What the colours of arrows, lines and rings mean."""
+    return "&emsp;<wbr>".join(
+        f"<span style='white-space:nowrap'><span style='color:{hex_of(colour)}'>{sign}</span> {escape(words)}</span>"
+        for sign, colour, words in KEY
+    )

@@ -42,9 +42,16 @@ class ErrorVectors(SceneGroup):
     """Nodes ``root/arrows`` and ``root/factor``."""
 
     def __init__(
-        self, viewer: Viewer, root: str = "/errors", magnification: float = 200.0, colour: Rgb = ERROR_VECTOR
+        self,
+        viewer: Viewer,
+        root: str = "/errors",
+        magnification: float = 200.0,
+        colour: Rgb = ERROR_VECTOR,
+        name: str = "residuals",
     ) -> None:
+        """``name`` is written with the factor, so that one tells several kinds of errors apart."""
         super().__init__(viewer, root)
+        self._name = name
         self._colour, self._magnification = colour, magnification
         self._measured, self._predicted = np.zeros((0, 3)), np.zeros((0, 3))
         self._label_m = np.zeros(3)
@@ -88,7 +95,7 @@ class ErrorVectors(SceneGroup):
                     node.remove()
                 self._drawn = []
                 return
-            text = f"errors {factor_text(self._magnification)}"
+            text = f"{self._name} {factor_text(self._magnification)}"
             mesh = add_solid(self._scene, f"{self._root}/arrows", solid, self._colour)
             label = self._scene.add_label(
                 f"{self._root}/factor", text, position=self._label_m, anchor="bottom-center", font_screen_scale=1.1

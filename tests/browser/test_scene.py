@@ -281,7 +281,7 @@ def test_a_highlight_a_factor_and_a_new_exaggeration_arrive(opened) -> None:
     demo.targets.highlight(1)
     state = "(n) => window.__viserMutable.nodeRefFromName[n] != null"
     until(lambda: page.evaluate(state, "/errors/arrows") and page.evaluate(state, "/axes/fitted/3/arrow"))
-    assert demo.server.scene.get_handle_by_name("/errors/factor").text == "errors × 250"
+    assert demo.server.scene.get_handle_by_name("/errors/factor").text == "residuals × 250"
     assert demo.server.scene.get_handle_by_name("/diagnosis/factor").text == "differences × 10"
     demo.fitted.highlight(None)
     demo.errors.magnification = 100.0
