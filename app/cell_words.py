@@ -13,7 +13,7 @@ from core.robot import Robot
 from core.session_library import SessionSummary
 from core.session_state import State
 from core.suggested_plan import unseen_joints
-from core.wording import fixed
+from core.wording import fixed, with_capital
 
 SESSION_WORD = "session-"
 SOURCES = {
