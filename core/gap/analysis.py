@@ -9,6 +9,7 @@ from core.gap import noise_found
 from core.gap.design import Design
 from core.gap.doings import Doings, doings
 from core.gap.effects.candidate import Candidate
+from core.gap.encoder_steps import encoder_steps
 from core.gap.evidence import Chosen, Evidence, joined
 from core.gap.folds import blocks
 from core.gap.kept_out import KNOWN, KeptOut
@@ -18,7 +19,7 @@ from core.gap.placement import place, placement_slots, with_placement
 from core.gap.problem import Problem, pose_problem
 from core.gap.scatter import joint_scatter
 from core.gap.search import Found, search
-from core.gap.sharpened import encoder_steps, sharpened
+from core.gap.sharpened import sharpened
 from core.gap.sim import Sim
 from core.gap.whitening import whitening
 from core.geometry import Array
@@ -160,7 +161,7 @@ def analyse(
         learnt = _learn(told_doings, problem, best, first, told, steps=turn == 0)
         fresh = [one for one in learnt.sharper if one.place.effect not in without]
         straight = learnt.bent_m2 < BENT**2 * noise.floor_m2.mean()
-        settled = _settled(noise, learnt.noise) and not _new(fresh, library) and straight
+        settled = _settled(noise, learnt.noise) and straight and not _matter(fresh, problem, best)
         if settled or turn == PASSES - 1:
             break
         noise, library = learnt.noise, [*library, *fresh]
@@ -191,9 +192,24 @@ def _settled(before: NoiseFound, after: NoiseFound) -> bool:
     return bool(same and np.abs(after.weight - before.weight).mean() < 0.003)
 
 
-def _new(fresh: list[Candidate], library: list[Candidate]) -> bool:
-    known = {(one.place, one.atom) for one in library}
-    return any((one.place, one.atom) not in known for one in fresh)
+def _matter(fresh: list[Candidate], problem: Problem, best: tuple[Evidence, float, float, Found, Chosen]) -> bool:
+    """Whether the search would choose any of fresh candidates beside or instead of what it found."""
+    _, prior, threshold, found, given = best
+    known = {(one.place, one.atom) for one in problem.candidates}
+    fresh = [one for one in fresh if (one.place, one.atom) not in known]
+    if not fresh:
+        return False
+    old = joined(given, found.chosen)
+    few = pose_problem(
+        problem.sim,
+        problem.doings,
+        [*(problem.candidates[g] for g in old.groups), *fresh],
+        problem.residual_m,
+        problem.white,
+    )
+    there = Chosen(tuple(range(len(given.groups))), given.sizes)
+    again = search(few.evidence(prior), np.arange(len(given.groups), len(few.candidates)), few.cost, threshold, there)
+    return max(again.chosen.groups, default=0) >= len(old.groups)
 
 
 def _first_noise(told: Doings, residual_m: Array, covariance: Array, weight: Array) -> NoiseFound:
@@ -269,15 +285,14 @@ def null_threshold(problem: Problem, evidence: Evidence) -> float:
 
 def _as_drawn(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
     """The search when the sim's geometry is a drawing's, off by what makes everything together most probable."""
-    return max((_with_geometry(problem, size) for size in DRAWN_PRIORS), key=lambda one: one[3].log_evidence)
-
-
-def _with_geometry(problem: Problem, drawn: float) -> tuple[Evidence, float, float, Found, Chosen]:
-    """The search when the sim's geometry is generally off: every frame and zero offset is a cause from the start."""
     evidence = problem.evidence(AS_CALIBRATED)
     threshold = null_threshold(problem, evidence)
-    given = drawn_geometry(problem, drawn)
-    found = search(evidence, problem.named, problem.cost, threshold, given)
+    # The sim's geometry is generally off: every frame and zero offset is a cause from the start.
+    tried = [
+        (search(evidence, problem.named, problem.cost, threshold, given), given)
+        for given in (drawn_geometry(problem, size) for size in DRAWN_PRIORS)
+    ]
+    found, given = max(tried, key=lambda one: one[0].log_evidence)
     return evidence, AS_CALIBRATED, threshold, found, given
 
 
@@ -315,9 +330,8 @@ def _learn(
     better = sharpened(problem.sim, told, chosen, named_left, own, scale)
     noise = _undoubted(noise, first, told.seen, chosen, better)
     if steps or noise.excess > 1:
-        bare, _ = _left(problem, evidence, prior, given)
-        for aim in (named_left, bare):
-            better += encoder_steps(problem.sim, told, aim, scale)
+        aims = [named_left] if not found.chosen.groups else [named_left, _left(problem, evidence, prior, given)[0]]
+        better += encoder_steps(problem.sim, told, aims, scale)
     if only is not None:
         better = [one for one in better if only(one)]
     state = joined(given, Chosen(found.chosen.groups[:1], found.chosen.sizes[:1]))

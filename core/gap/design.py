@@ -11,7 +11,7 @@ from core.gap.effects.candidate import Candidate, Column
 from core.gap.sim import Sim, Slot
 from core.geometry import Array
 
-CHUNK_ROWS = 1500
+CHUNK_ROWS = 500
 
 
 @dataclass(frozen=True, eq=False)

@@ -64,8 +64,8 @@ def _drawn(problem: Problem, evidence: Evidence) -> Drawn | None:
     pulls, truth = evidence.null_pulls[:, :worlds].copy(), np.zeros(worlds, dtype=int)
     kinds = np.unique(places[seen])
     for w in range(worlds):
-        mine = [g for g in seen if places[g] == rng.choice(kinds)] or seen
-        truth[w] = rng.choice(mine)
+        kind = rng.choice(kinds)
+        truth[w] = rng.choice([g for g in seen if places[g] == kind])
         size = np.exp(rng.uniform(*np.log(SIZES))) * np.sqrt(problem.sums.count)
         for g, share in ((truth[w], 1.0), (rng.choice(nameless), STRANGE)):
             own = problem.slices[g]

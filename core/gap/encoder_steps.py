@@ -1,0 +1,232 @@
+"""Steps of encoders: saw-teeth that stand out of the spectra of joint errors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from core.gap.doings import Doings
+from core.gap.effects import drives
+from core.gap.effects.candidate import Candidate, motors
+from core.gap.library import joint_alone
+from core.gap.sim import Part, Sim, Slot
+from core.geometry import Array
+
+COARSEST_STEP_RAD, COARSEST_STEP_M = 0.06, 0.02
+SPECTRUM_BINS = 1 << 18
+"""Over the span of a joint."""
+PEAK = 20.0
+"""A line of the spectrum must stand so many times above its neighbourhood."""
+ALIKE, MOST_TRIED, MOST_TRIED_ALIKE = 0.8, 6, 3
+"""Waves of at least so much of the greatest power may be the steps', as many of them are tried."""
+SHARES = (0.5, 1.6)
+STEPS_AROUND, ALIKE_AROUND = 41, 61
+PHASES_AROUND = 17
+PHASES = tuple(float(phase) for phase in np.arange(8) / 8)
+
+
+def encoder_steps(sim: Sim, doings: Doings, aims_m: Sequence[Array], weight: Array) -> list[Candidate]:
+    """Steps of encoders whose saw-teeth stand out of residuals: of motors, or of joints that are driven by two.
+
+    Args:
+        aims_m: residuals in which they are looked for, one set after the other, (m, 3) each.
+        weight: of each point, 1/m^2, 0: left out, (m,).
+    """
+    out = _steps_of(sim, doings, Part.DRIVE, aims_m, weight)
+    if doings.seen.chain.coupling_gains.any():
+        out += [joint_alone(one) for one in _steps_of(sim, doings.uncoupled, Part.JOINT, aims_m, weight)]
+    return out
+
+
+def _steps_of(sim: Sim, doings: Doings, part: Part, aims_m: Sequence[Array], weight: Array) -> list[Candidate]:
+    seen: list[tuple[Stops, Array]] = []
+    for joint in motors(doings):
+        field = sim.fields([Slot(part, joint)])[:, :, 0]
+        strength = weight * np.sum(field**2, axis=1)
+        if strength.max() > 0:
+            sliding = bool(doings.seen.chain.sliding[joint])
+            seen.append((Stops(joint, sliding, doings.active[:, joint], strength), field))
+    found = []
+    for aim_m in aims_m:
+        spectra = [Spectrum(stops, weight * np.sum(field * aim_m, axis=1)) for stops, field in seen]
+        found += [drives.quantisation(doings, steps) for steps in _in_spectra(spectra)]
+    return found
+
+
+def _in_spectra(spectra: Sequence["Spectrum"]) -> list[dict[int, tuple[float, float]]]:
+    """Steps of one joint after the other, of those together, and of all alike: size and phase by joint."""
+    single = {one.stops.joint: found for one in spectra if (found := one.steps()) is not None}
+    out = [{joint: found} for joint, found in single.items()]
+    if len(single) > 1:
+        out.append(single)
+    turning = [spectrum for spectrum in spectra if not spectrum.stops.sliding]
+    if len(turning) > 1:
+        sizes = {single[one.stops.joint][0] for one in turning if one.stops.joint in single}
+        out += [alike for alike in (common_steps(turning), *(_alike(turning, size) for size in sizes)) if alike]
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Stops:
+    """Where one joint stood, and how well each point tells its error."""
+
+    joint: int
+    """From 0."""
+    sliding: bool
+    x: Array
+    """(m,)"""
+    strength: Array
+    """Weights of joint errors, (m,)."""
+
+    @property
+    def span(self) -> float:
+        return float(np.ptp(self.x))
+
+    @property
+    def coarsest(self) -> float:
+        """Coarser steps would be other effects."""
+        return COARSEST_STEP_M if self.sliding else COARSEST_STEP_RAD
+
+    @cached_property
+    def _bins(self) -> np.ndarray:
+        return np.minimum(((self.x - self.x.min()) / self.span * SPECTRUM_BINS).astype(int), SPECTRUM_BINS - 1)
+
+    def waves(self, values: Array) -> Array:
+        """Sum of values times exp(-2 pi i wave x) for each wave, (SPECTRUM_BINS + 1,)."""
+        return np.fft.rfft(np.bincount(self._bins, values, 2 * SPECTRUM_BINS))
+
+    @cached_property
+    def wave(self) -> Array:
+        """Waves that are looked at, in a unit of x, (SPECTRUM_BINS // 4 + 1,): finer steps would be blurred."""
+        return np.arange(SPECTRUM_BINS // 4 + 1) / (2 * self.span)
+
+    @cached_property
+    def _weights(self) -> Array:
+        return self.waves(self.strength)
+
+    @cached_property
+    def weighed(self) -> Array:
+        """Sum of the weights times each wave over their sum."""
+        return self._weights[: len(self.wave)] / self.strength.sum()
+
+    @cached_property
+    def products(self) -> tuple[Array, Array, Array]:
+        """Weighted squares of cosines and of sines less their means, and their products."""
+        whole, once = float(self.strength.sum()), self.weighed
+        twice = self._weights[: 2 * len(self.wave) : 2]
+        cosines = (whole + twice.real) / 2 - whole * once.real**2
+        sines = (whole - twice.real) / 2 - whole * once.imag**2
+        return cosines, sines, -twice.imag / 2 + whole * once.real * once.imag
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Errors of one joint as a sum of waves of its displacement."""
+
+    stops: Stops
+    error: Array
+    """Weighted joint errors, (m,)."""
+
+    @cached_property
+    def _pull(self) -> Array:
+        # What is constant in errors, placement has taken up.
+        return self.stops.waves(self.error)[: len(self.stops.wave)] - self.error.sum() * self.stops.weighed
+
+    @cached_property
+    def power(self) -> Array:
+        """Of each wave, in units of what noise makes of it; 0 where steps would be so coarse as to be other effects."""
+        power = np.abs(self._pull) ** 2 / max(float(np.sum(self.error**2)), 1e-300)
+        return np.where(self.stops.wave < 1 / self.stops.coarsest, 0.0, power)
+
+    @cached_property
+    def amplitude(self) -> Array:
+        """Of each wave when it is fitted to the errors beside a constant, rad or m."""
+        cosines, sines, both = self.stops.products
+        cosine, sine = self._pull.real, -self._pull.imag
+        determinant = np.maximum(cosines * sines - both**2, 1e-6 * float(self.stops.strength.sum()) ** 2)
+        return np.hypot(sines * cosine - both * sine, cosines * sine - both * cosine) / determinant
+
+    def steps(self) -> tuple[float, float] | None:
+        """Size and phase of the steps that stand out; None: none."""
+        if self.stops.span < 4 * self.stops.coarsest / 3:
+            return None
+        if not self.power.max() > PEAK:
+            return None
+        places = _whole_steps(self.stops.wave, self.power, self.amplitude, MOST_TRIED)
+        best = max((self.saw_near(1 / self.stops.wave[k]) for k in places), default=(0.0, 0.0))
+        return (best[1], self.sharp_phase(best[1])) if best[0] > 0 else None
+
+    def saw_near(self, step: float) -> tuple[float, float]:
+        """The best explained energy near a size of steps, and the size."""
+        sizes = step + step**2 / self.stops.span / 2 * np.linspace(-1, 1, STEPS_AROUND)
+        energy = self.best_energy(sizes)
+        best = int(np.argmax(energy))
+        return float(energy[best]), float(sizes[best])
+
+    def best_energy(self, sizes: Array) -> Array:
+        """Energy that steps of each size (k,) explain at their best phase, (k,)."""
+        energy = self.explained(np.repeat(sizes, len(PHASES)), np.tile(PHASES, len(sizes)))
+        return energy.reshape(len(sizes), -1).max(axis=1)
+
+    def sharp_phase(self, step: float) -> float:
+        """The best phase of steps of a size, as finely as points can tell."""
+        phases, width = np.array(PHASES), 1 / len(PHASES)
+        for _ in range(3):
+            best = phases[int(np.argmax(self.explained(np.full(len(phases), step), phases)))]
+            phases = np.append(best, best + width * np.linspace(-1, 1, PHASES_AROUND))
+            width /= 8
+        return float(best)
+
+    def explained(self, steps: Array, phases: Array) -> Array:
+        """Energy that steps of each size and phase (k,) explain; 0 where a share of them does that is far from one.
+
+        Such a share of other steps may look alike at the few places where a joint stood, and is none.
+        """
+        teeth = drives.saw(self.stops.x, steps[:, None], phases[:, None])
+        strength = self.stops.strength
+        teeth -= (teeth @ strength / strength.sum())[:, None]
+        pull, square = teeth @ self.error, np.maximum(teeth**2 @ strength, 1e-300)
+        whole = (pull / square > SHARES[0]) & (pull / square < SHARES[1])
+        return np.where(whole, pull**2 / square, 0.0)
+
+
+def _whole_steps(wave: Array, power: Array, amplitude: Array, most: int) -> np.ndarray:
+    """The wave that stands out most, and such as do nearly so and have the amplitude of whole steps of their length.
+
+    Where a joint stood at few places, steps of many lengths look alike but for that: a saw-tooth of steps s has a
+    fundamental wave of amplitude s / pi.
+    """
+    high = np.flatnonzero(power > ALIKE * power.max())
+    off = np.abs(np.log(np.maximum(np.pi * wave[high] * amplitude[high], 1e-300)))
+    return np.unique([*high[np.argsort(off)[: most - 1]], *high[np.argsort(power[high])[-1:]]]).astype(int)
+
+
+def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | None:
+    """One size of steps for all turning joints, by the sum of their spectra; None: none stands out."""
+    waves = max((spectrum.stops for spectrum in spectra), key=lambda stops: stops.span).wave
+    places = [np.rint(waves * 2 * spectrum.stops.span).astype(int) for spectrum in spectra]
+    total = sum(spectrum.power[place] for spectrum, place in zip(spectra, places, strict=True))
+    if not total.max() > PEAK + 2 * len(spectra):
+        return None
+    strengths = [float(spectrum.stops.strength.sum()) for spectrum in spectra]
+    amplitudes = [spectrum.amplitude[place] for spectrum, place in zip(spectra, places, strict=True)]
+    amplitude = np.average(amplitudes, axis=0, weights=strengths)
+    found = _whole_steps(waves, total, amplitude, MOST_TRIED_ALIKE)
+    best = max((_alike_near(spectra, 1 / waves[k]) for k in found), default=(0.0, 0.0))
+    return _alike(spectra, best[1]) if best[0] > 0 else None
+
+
+def _alike(spectra: list[Spectrum], size: float) -> dict[int, tuple[float, float]]:
+    """Steps of one size for all, at the best phase of each."""
+    return {spectrum.stops.joint: (size, spectrum.sharp_phase(size)) for spectrum in spectra}
+
+
+def _alike_near(spectra: list[Spectrum], step: float) -> tuple[float, float]:
+    """Steps of one size, counted alike, near a size: the energy that they explain, and the size."""
+    farthest = max(float(np.abs(spectrum.stops.x).max()) for spectrum in spectra)
+    for width in (step**2 / min(spectrum.stops.span for spectrum in spectra), step**2 / farthest):
+        sizes = step + width * np.linspace(-1, 1, ALIKE_AROUND)
+        energy = sum(spectrum.best_energy(sizes) for spectrum in spectra)
+        step = float(sizes[int(np.argmax(energy))])
+    return float(energy.max()), step
