@@ -134,9 +134,7 @@ def _chances(chances: Array, slip: bool) -> Array:
     return np.append(chances[:-1], 0.0) if slip else chances
 
 
-def _is_slip(
-    points_m: Array, commanded: Array, target: ArrayLike | None, covariance_m2: ArrayLike | None
-) -> bool:
+def _is_slip(points_m: Array, commanded: Array, target: ArrayLike | None, covariance_m2: ArrayLike | None) -> bool:
     """Whether the last shot lies far off the circle of all the earlier ones, (k - 1, 3), of a rotary joint.
 
     A wrong target or a slip of the pen can bend the arc so much that the axis goes through it, or that none is left to

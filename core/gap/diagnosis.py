@@ -51,8 +51,9 @@ TOLD_SHARE = 0.01
 HOLD_OUT = "fifths of each arc and regions of the joint space, each predicted from the others"
 SURE_OF_REST = 0.1
 """What nameless functions must still close, as a share of the gap, to be told as something unknown."""
-MANY = 3
-"""Names that together leave too much: none of their joints is where something acts."""
+MANY, MANY_LEAVE = 3, 4.0
+"""Names that together leave too much: none of their joints is where something acts. More of them than that must leave
+less than so many floors (mean squares), or they only imitate something else."""
 FAINT = 1.3
 """Times the noise (mean squares) of what does not stand out of it by itself."""
 CLOSED = 0.9
@@ -184,7 +185,11 @@ class Findings:
         if self._faint(order):
             order = []
         unknown = self._unknown([one for one in judged if one.unknown], order)
-        if order and not self.analysis.given.groups and sufficient(self.judge, _chosen(order)) < 0.5:
+        one = None if self.analysis.given.groups else self._one_for_all(order)
+        if one is not None:
+            rest = [other for other in unknown if not other.place.same_as(one.place)]
+            return [one, *self._adding(order, [one, *rest]), *rest]
+        if order and not self.analysis.given.groups and not self._enough(order):
             return [*self._stood_in_for(order, unknown), *(self._adding(order, unknown) if unknown else order)]
         return self._strongest_first(order, unknown)
 
@@ -193,16 +198,42 @@ class Findings:
         closed = self.judge.base_m2 - self.judge.square(_chosen(named))
         return self.judge.base_m2 < FAINT * self.floor_m2 and closed < 0.5 * self.judge.closable_m2
 
+    def _enough(self, named: list[Stand]) -> bool:
+        """Whether names close what can be closed; many together may do so for anything, but not down to the noise."""
+        chosen = _chosen(named)
+        if len(named) > MANY and self.judge.open.square_m2(chosen) > MANY_LEAVE * self.judge.floor_m2:
+            return False
+        return sufficient(self.judge, chosen) >= 0.5
+
+    def _one_for_all(self, named: list[Stand]) -> Stand | None:
+        """One thing without a name that leaves less of kept-out points than names at several places; None: none."""
+        judge = self.judge
+        if len({judge.variable(one.place) for one in named}) < 2 or not judge.local:
+            return None
+        left = {variable: judge.open.square_m2(chosen) for variable, chosen in judge.local.items()}
+        best = min(left, key=left.__getitem__)
+        by_names = judge.open.square_m2(_chosen(named))
+        if by_names < AT_FLOOR * judge.floor_m2 or by_names < left[best]:
+            return None
+        return Stand(unknown_at(best), judge.local[best].groups, judge.local[best].sizes, 0.0)
+
     def _stood_in_for(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
         """What names that leave too much most probably stand in for: something at their joint, or everywhere."""
         lost = self._lost_m2([*named, *unknown])[len(named) :]
         unknown = [unknown[k] for k in np.argsort(lost)[::-1]]
         if unknown and len(named) < MANY:
             return unknown
-        variables = {self.judge.variable(one.place) for one in named}
-        place = unknown_at(variables.pop() if len(variables) == 1 else "configuration")
+        place = self._foremost(named)
         same = [one for one in unknown if one.place.same_as(place)] or [Stand(place, (), (), 0.0)]
         return [*same, *(one for one in unknown if not one.place.same_as(place))]
+
+    def _foremost(self, named: list[Stand]) -> Place:
+        """Where names stand in for something: their common variable, or that of the best functions without a name."""
+        variables = {self.judge.variable(one.place) for one in named}
+        if len(variables) == 1:
+            return unknown_at(variables.pop())
+        best = [self.judge.problem.candidates[g].place for g in self.judge.lone.groups[:1]]
+        return replace(best[0], effect=UNKNOWN) if best else unknown_at("configuration")
 
     def _strongest_first(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
         """Names in their order; before them what has no name and closes more than any: names must add to it then."""
@@ -473,7 +504,7 @@ def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, 
     if stand.groups[0] in found.analysis.given.groups:
         # The geometry as a whole is settled by points kept out; this is about the one frame.
         return _significance(found, stand), (stand.place,)
-    probability, alike = twins(stand, rivals(found.judge, stand, others))
+    probability, alike = twins(found.judge, stand, rivals(found.judge, stand, others))
     return probability * adequate(found.judge, _chosen(found.named), _chosen(found.stands)), alike
 
 

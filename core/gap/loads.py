@@ -30,6 +30,10 @@ class Loads:
     """Moment there of one kilogram moved by one metre along x, y or z of the last frame, (m, n, 3, offset 3)."""
     middle_m: Array
     """Middles of the links, in the frames that move with them, (n, 3)."""
+    carried_kg: Array
+    """Mass of all links beyond each, (n,)."""
+    link_kg: Array
+    """Mass of each link, (n,)."""
 
 
 def loads(robot: Robot, net: Array) -> Loads | None:
@@ -66,6 +70,8 @@ def loads(robot: Robot, net: Array) -> Loads | None:
         middle_kilogram=local(cross(tool - middle, down)),
         middle_offset=to_frame @ _turning(frames, down)[:, None],
         middle_m=middle_m,
+        carried_kg=without_own_kg,
+        link_kg=mass,
     )
 
 

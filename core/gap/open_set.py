@@ -22,8 +22,10 @@ SMOOTH = frozenset({"zero_offset", "ratio", "eccentricity", "linkage", "axis_wob
 RIPPLE = 6.0
 EXACT, EXACTLY = frozenset({"zero_offset", "ratio", "eccentricity", "mesh"}), 0.96
 """Smooth effects whose forms are exact must close nearly all: whatever is smooth looks like them otherwise."""
-LOCALLY, GLOBALLY = 0.92, 0.75
-"""Shares of what nameless functions close that a name must close to stand."""
+LOCALLY = 0.92
+"""Share of what nameless functions close that a name must close to stand."""
+MOSTLY = 0.85
+"""Such a share, where all that was found at the place closes the rest down to the noise."""
 WEAKER = 0.10
 """Of what is closed at one place: the second name there must close so much."""
 MOVES = 0.1
@@ -104,6 +106,11 @@ class Judge:
         for chosen in (self.rest, self.lone, *self.local.values()):
             groups |= dict.fromkeys(chosen.groups)
         return KeptOut(self.problem, self.fold, self.geometry_prior, tuple(groups), self.geometry)
+
+    @cached_property
+    def open(self) -> KeptOut:
+        """The same where every fit finds its own geometry: fair between names and what has none."""
+        return replace(self.kept_out, geometry=None)
 
     @cached_property
     def geometry(self) -> Array:
@@ -224,9 +231,9 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Cho
     named = _names(spot)
     first = judge.problem.candidates[here.groups[spot.order[0]]]
     complete = small.groups and judge.square(joined(elsewhere, here, small)) < AT_FLOOR * judge.floor_m2
-    if not named and complete and not _smooth(first):
+    if not named and complete and (not _smooth(first) or spot.share(spot.order[:1]) >= MOSTLY):
         # Small causes at the same place are real where they complete the others down to the noise; but smooth
-        # functions of one joint together imitate any other.
+        # functions of one joint together imitate any other, where none of them does most of it alone.
         named = _names(replace(spot, elsewhere=joined(elsewhere, small)))
     if named:
         return named
@@ -276,51 +283,65 @@ class Spot:
         alone = [self.closes_m2([k]) for k in range(len(self.here.groups))]
         return [int(k) for k in np.argsort(alone)[::-1]]
 
-    def place(self, k: int) -> Place:
-        return self.judge.problem.candidates[self.here.groups[k]].place
+    def candidate(self, k: int) -> Candidate:
+        return self.judge.problem.candidates[self.here.groups[k]]
+
+    @cached_property
+    def complete(self) -> bool:
+        """Whether all names here leave no more than noise."""
+        return self.judge.square(joined(self.elsewhere, self.here)) < AT_FLOOR * self.judge.floor_m2
+
+    def forms(self, k: int) -> list[int]:
+        """A name with all that describes the same cause: of effects whose forms are rough, and orders of one mesh."""
+        mine = self.candidate(k).place
+        same = [k, *(other for other in self.order if other != k and self.candidate(other).place.same_as(mine))]
+        orders = mine.effect == "mesh" and self.complete and self.share([k]) >= MOSTLY
+        return same if mine.effect in COMPLETED or orders else [k]
 
 
 def _names(spot: Spot) -> list[Stand]:
     """The names that suffice at one variable: one, several forms of one, or two; none: nameless functions do better."""
-    judge, here, first = spot.judge, spot.here, spot.order[0]
-    same = [k for k in spot.order if spot.place(k).same_as(spot.place(first))]
-    rough = spot.place(first).effect in COMPLETED
-    plain = judge.problem.candidates[here.groups[first]]
-    if spot.share([first]) >= (EXACTLY if plain.place.effect in EXACT and _smooth(plain) else LOCALLY):
-        which = same if rough else [first]
-        second = _second(spot, which)
-        stand = _stand(judge, here, which, spot.share([first]))
-        return [stand] if second is None else [stand, _stand(judge, here, [second], spot.share([first]))]
-    if len(same) > 1 and rough and spot.share(same) >= LOCALLY:
-        return [_stand(judge, here, same, spot.share(same))]
-    pairs = [k for k in spot.order[1:] if _make_a_pair(judge, here, first, k)]
-    best = max(pairs, key=lambda k: spot.closes_m2([first, k]), default=None)
-    if best is None:
-        return []
-    both, one = spot.closes_m2([first, best]), spot.closes_m2([first])
-    if spot.share([first, best]) >= LOCALLY and both - one >= WEAKER * both:
-        together = spot.share([first, best])
-        return [_stand(judge, here, [first], together), _stand(judge, here, [best], together)]
+    first = spot.order[0]
+    forms = spot.forms(first)
+    exact = spot.candidate(first).place.effect in EXACT and _smooth(spot.candidate(first))
+    enough = spot.share([first]) >= (EXACTLY if exact else LOCALLY)
+    if enough or (len(forms) > 1 and spot.share(forms) >= LOCALLY):
+        share = spot.share([first] if enough else forms)
+        second = _second(spot, forms)
+        return [_stand(spot, which, share) for which in (forms, second) if which]
+    pairs = [[*forms, *spot.forms(k)] for k in spot.order if _make_a_pair(spot, first, k)]
+    both = max(pairs, key=spot.closes_m2, default=[])
+    if both and spot.share(both) >= LOCALLY:
+        closed, rest = spot.closes_m2(both), both[len(forms) :]
+        if closed - spot.closes_m2(forms) >= WEAKER * closed:
+            return [_stand(spot, which, spot.share(both)) for which in (forms, rest)]
     return []
 
 
-def _second(spot: Spot, which: list[int]) -> int | None:
+def _second(spot: Spot, which: list[int]) -> list[int]:
     """A second name at the same place that closes what the first leaves, where that is more than the noise."""
-    left = spot.ceiling_m2 - spot.closes_m2(which)
+    closed = spot.closes_m2(which)
+    left = spot.ceiling_m2 - closed
     if left < spot.judge.floor_m2:
-        return None
+        return []
+    sure = spot.share(which) >= EXACTLY
     for k in spot.order:
-        pair = k not in which and _make_a_pair(spot.judge, spot.here, which[0], k)
-        if pair and spot.closes_m2([*which, k]) - spot.closes_m2(which) >= LOCALLY * left:
-            return k
-    return None
+        pair = k not in which and (_make_a_pair(spot, which[0], k) or (sure and _differ(spot, which[0], k)))
+        if pair and spot.closes_m2([*which, *spot.forms(k)]) - closed >= LOCALLY * left:
+            return spot.forms(k)
+    return []
 
 
-def _make_a_pair(judge: Judge, here: Chosen, first: int, second: int) -> bool:
+def _make_a_pair(spot: Spot, first: int, second: int) -> bool:
     """Whether two names at one variable can both be right: two smooth functions of one joint imitate any third."""
-    names = [judge.problem.candidates[here.groups[k]] for k in (first, second)]
-    same = (names[0].place.effect, names[0].place.source) == (names[1].place.effect, names[1].place.source)
-    return not same and not all(_smooth(name) for name in names)
+    smooth = all(_smooth(spot.candidate(k)) for k in (first, second))
+    return _differ(spot, first, second) and not smooth
+
+
+def _differ(spot: Spot, first: int, second: int) -> bool:
+    """Whether two names are of different effects."""
+    one, other = (spot.candidate(k).place for k in (first, second))
+    return (one.effect, one.source) != (other.effect, other.source)
 
 
 def _smooth(candidate: Candidate) -> bool:
@@ -332,6 +353,6 @@ def _pick(chosen: Chosen, which: list[int]) -> Chosen:
     return Chosen(tuple(chosen.groups[k] for k in which), tuple(chosen.sizes[k] for k in which))
 
 
-def _stand(judge: Judge, chosen: Chosen, which: list[int], local: float) -> Stand:
-    one = _pick(chosen, which)
-    return Stand(judge.problem.candidates[one.groups[0]].place, one.groups, one.sizes, float(min(local, 1.0)))
+def _stand(spot: Spot, which: list[int], local: float) -> Stand:
+    one = _pick(spot.here, which)
+    return Stand(spot.candidate(which[0]).place, one.groups, one.sizes, float(min(local, 1.0)))

@@ -7,6 +7,7 @@ changes the evidence by that share, so differences below it decide nothing.
 import numpy as np
 from scipy.special import expit
 
+from core.gap.effects.candidate import motors
 from core.gap.evidence import Chosen, joined, without
 from core.gap.open_set import AT_FLOOR, LOCALLY, Judge, Stand
 from core.gap.result import Place
@@ -21,6 +22,8 @@ CLOSES_AT, CLOSES_WIDTH = 0.82, 0.03
 leave more, something without a name is at work and they stand in for it. From simulated worlds with known causes."""
 LEAST, MOST = 0.1, 0.97
 """However badly or well names close, so often they are right in those worlds."""
+ONE_MOVES = 0.5
+"""Where one joint alone moves, everything is some function of it: no name is likelier than not."""
 TWIN_ODDS = 0.05
 """A candidate at least so probable beside the named one is its twin."""
 
@@ -94,12 +97,13 @@ def sufficient(judge: Judge, named: Chosen) -> float:
     return float(expit((closed - CLOSES_AT) / CLOSES_WIDTH))
 
 
-def has_name(stand: Stand) -> float:
+def has_name(judge: Judge, stand: Stand) -> float:
     """Probability that some name of the library is right, from how much nameless functions would still add."""
-    return float(expit((stand.local - NAMED_AT) / NAMED_WIDTH))
+    most = ONE_MOVES if len(motors(judge.problem.doings)) < 2 else 1.0
+    return most * float(expit((stand.local - NAMED_AT) / NAMED_WIDTH))
 
 
-def twins(stand: Stand, ranked: list[tuple[Place, float]]) -> tuple[float, tuple[Place, ...]]:
+def twins(judge: Judge, stand: Stand, ranked: list[tuple[Place, float]]) -> tuple[float, tuple[Place, ...]]:
     """Probability of the place that stands, and the places that the data cannot tell from it, itself first."""
     mine = next((p for place, p in ranked if place.same_as(stand.place)), 0.0)
     others = [
@@ -107,4 +111,4 @@ def twins(stand: Stand, ranked: list[tuple[Place, float]]) -> tuple[float, tuple
         for place, p in ranked
         if place is not NO_CAUSE and not place.same_as(stand.place) and p >= TWIN_ODDS * max(mine, 1e-12)
     ]
-    return mine * has_name(stand), (stand.place, *others[:11])
+    return mine * has_name(judge, stand), (stand.place, *others[:11])

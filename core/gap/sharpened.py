@@ -1,16 +1,20 @@
 """What a grid of candidates finds roughly, found sharply: the order of a mesh, the moment of a shift."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from core.gap.doings import Doings
 from core.gap.effects import drives, instrument
 from core.gap.effects.candidate import Candidate
+from core.gap.library import joint_alone
 from core.gap.sim import Part, Sim, Slot
 from core.geometry import Array
 
 FINER = 25
+OF_THE_BASE = frozenset({"drift", "base_shift", "thermal"})
+"""What moves everything as time goes by."""
 
 
 def sharpened(
@@ -37,6 +41,10 @@ def sharpened(
         elif place.effect == "target_slip":
             names = [target.name for target in doings.seen.campaign.targets]
             out.append(_shift(sim, doings, place.record, left_m + own, every, names.index(place.target)))
+    timed = [own for candidate, own in zip(chosen, own_m, strict=True) if candidate.place.effect in OF_THE_BASE]
+    if timed:
+        # A great shift between two moments of the grid looks like anything else that time does.
+        out.append(_shift(sim, doings, None, left_m + sum(timed), every, None))
     return out
 
 
@@ -51,16 +59,19 @@ def _neighbours(doings: Doings, one: Candidate, other: Candidate) -> bool:
 def _periodic(sim: Sim, doings: Doings, candidate: Candidate, aim_m: Array, weight: Array) -> list[Candidate]:
     """The order between the neighbours on the grid at which a periodic error explains most, under all its names."""
     joint, order = candidate.place.joint - 1, drives.order_of(candidate)
-    field = sim.fields([Slot(Part.DRIVE, joint)])[:, :, 0]
-    x = doings.active[:, joint]
-    orders = order + drives.order_step(doings, joint) * np.linspace(-1.0, 1.0, FINER)
-    orders = orders[orders > (0.0 if doings.seen.chain.sliding[joint] else 1.5)]
+    part = candidate.columns(doings)[0][0][0].part
+    told = doings.uncoupled if part is Part.JOINT else doings
+    field = sim.fields([Slot(part, joint)])[:, :, 0]
+    x = told.active[:, joint]
+    orders = order + drives.order_step(told, joint) * np.linspace(-1.0, 1.0, FINER)
+    orders = orders[orders > (0.0 if told.seen.chain.sliding[joint] else 1.5)]
     gains = [_explained([np.sin(k * x), np.cos(k * x)], field, aim_m, weight) for k in orders]
-    return drives.periodic(candidate, doings, float(orders[int(np.argmax(gains))]))
+    found = drives.periodic(candidate, told, float(orders[int(np.argmax(gains))]))
+    return [replace(joint_alone(one), choices=one.choices) for one in found] if part is Part.JOINT else found
 
 
 def _shift(sim: Sim, doings: Doings, record: int | None, aim_m: Array, weight: Array, target: int | None) -> Candidate:
-    """The record between the neighbours on the grid at which the change explains most."""
+    """The record at which the change explains most: between the neighbours on the grid, or anywhere."""
     seen = doings.seen
     slots = (
         [Slot(Part.BASE, 0, k) for k in range(6)]
@@ -73,8 +84,9 @@ def _shift(sim: Sim, doings: Doings, record: int | None, aim_m: Array, weight: A
     pulls = np.cumsum(np.einsum("mck,mc->mk", fields, aim)[::-1], axis=0)[::-1]
     # What happened while nobody looked is told from the record on at which it was seen.
     starts = (np.arange(seen.count) if target is None else np.flatnonzero(seen.target == target))[1:]
-    near = np.abs(seen.record[starts] - record) <= np.ptp(seen.record) * 2.0 / instrument.MOMENTS
-    starts = starts[near] if near.any() else starts
+    if record is not None:
+        near = np.abs(seen.record[starts] - record) <= np.ptp(seen.record) * 2.0 / instrument.MOMENTS
+        starts = starts[near] if near.any() else starts
     # The part before the change is free as well: placement has already met both halves in the middle.
     before, pulls_before = squares[0] - squares[starts], pulls[0] - pulls[starts]
     ridge = 1e-9 * np.trace(squares[0]) * np.eye(len(slots))

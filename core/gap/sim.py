@@ -40,6 +40,13 @@ class Part(Enum):
     """Everything, in the instrument's frame: turn about the middle of all points (0..2) and shift (3..5)."""
     SCALE = "scale"
     """All points, away from the middle, by a factor 1 + value."""
+    ROOM = "room"
+    """A point by where it lies: along ``axis`` of the instrument's frame by value times the product ``index`` of two
+    coordinates about the middle, m."""
+
+
+PRODUCTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+"""Pairs of coordinates whose products bend the space of the instrument."""
 
 
 @dataclass(frozen=True)
@@ -143,8 +150,13 @@ class Sim:
             local = np.where(rides[:, None], moved, local)
         points = local @ self.base[:3, :3].T + self.base[:3, 3]
         points = _move(_twist(motions, Part.BASE, 0, m), points - self.middle_m) + self.middle_m
-        scale = motions.get(Slot(Part.SCALE))
-        return points if scale is None else points + scale[:, None] * (points - self.middle_m)
+        out, scale = points, motions.get(Slot(Part.SCALE))
+        if scale is not None:
+            out = out + scale[:, None] * (points - self.middle_m)
+        for slot, value in motions.items():
+            if slot.part is Part.ROOM:
+                out = out + value[:, None] * self._bent(slot, points)
+        return out
 
     def _placed_points(self) -> Array:
         placed = self.simulated_to_instrument
@@ -169,6 +181,8 @@ class Sim:
             return cross(unit, points - self.middle_m) if slot.axis < 3 else unit
         if slot.part is Part.SCALE:
             return points - self.middle_m
+        if slot.part is Part.ROOM:
+            return self._bent(slot, points)
         if slot.part is Part.TARGET:
             rows = np.arange(self.seen.count)
             unit = after[rows, self.seen.link - 1, :3, slot.axis]
@@ -178,6 +192,11 @@ class Sim:
         answer = cross(unit, points - frame[:, :3, 3]) if slot.axis < 3 else unit
         rides = self._beyond(slot.index) if slot.part is Part.BEYOND else self.seen.link > slot.index
         return np.where(rides[:, None], answer, 0.0)
+
+    def _bent(self, slot: Slot, points: Array) -> Array:
+        first, second = PRODUCTS[slot.index]
+        away = points - self.middle_m
+        return (away[:, first] * away[:, second])[:, None] * np.eye(3)[slot.axis]
 
     def _beyond(self, index: int) -> np.ndarray:
         """Points that a link carries: on links behind it, or on itself where none of them has a target, (m,)."""

@@ -15,9 +15,7 @@ def test_a_spot_is_found_by_its_word(number, parameter):
     assert spot_named(Spot(number, parameter).word) == Spot(number, parameter)
 
 
-@pytest.mark.parametrize(
-    "word", ["", "0", "-1", "2-c_m", "2-a_m ", "2-a_m\n", "9999", "2-a_m<script>", "٣", "1٣"]
-)
+@pytest.mark.parametrize("word", ["", "0", "-1", "2-c_m", "2-a_m ", "2-a_m\n", "9999", "2-a_m<script>", "٣", "1٣"])
 def test_anything_else_names_nothing(word):
     assert spot_named(word) is None
 

@@ -9,7 +9,7 @@ from random_arms import random_motion
 from scipy.spatial.transform import Rotation
 
 from core.gap.placement import placement_slots, with_placement
-from core.gap.sim import Part, Sim, Slot
+from core.gap.sim import PRODUCTS, Part, Sim, Slot
 from core.geometry import Array, apply
 
 STEP = 1e-5
@@ -20,6 +20,7 @@ def all_slots(sim: Sim) -> list[Slot]:
     slots = [Slot(part, j) for part in (Part.JOINT, Part.DRIVE) for j in range(n)]
     slots += [Slot(part, j, k) for part in (Part.AXIS, Part.LINK, Part.BEYOND) for j in range(n) for k in range(6)]
     slots += [Slot(Part.TARGET, t, k) for t in range(targets) for k in range(3)]
+    slots += [Slot(Part.ROOM, p, k) for p in range(len(PRODUCTS)) for k in range(3)]
     return [*slots, *(Slot(Part.BASE, 0, k) for k in range(6)), Slot(Part.SCALE)]
 
 
@@ -59,7 +60,12 @@ def by_hand(sim: Sim, motions: dict[Slot, Array], k: int) -> Array:
     t = seen.target[k]
     place = sim.target_m[t] + [motions[Slot(Part.TARGET, t, axis)][k] for axis in range(3)]
     point = apply(sim.base @ frame, place) - sim.middle_m
-    return apply(rigid(motions, Part.BASE, 0, k), point) * (1 + motions[Slot(Part.SCALE)][k]) + sim.middle_m
+    placed = apply(rigid(motions, Part.BASE, 0, k), point)
+    bent = [
+        sum(motions[Slot(Part.ROOM, p, axis)][k] * placed[a] * placed[b] for p, (a, b) in enumerate(PRODUCTS))
+        for axis in range(3)
+    ]
+    return placed * (1 + motions[Slot(Part.SCALE)][k]) + bent + sim.middle_m
 
 
 @pytest.mark.parametrize("name", ARMS)

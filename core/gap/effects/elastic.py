@@ -11,6 +11,9 @@ from core.gap.result import Place
 from core.gap.sim import Part, Slot
 from core.geometry import Array
 
+TINY = 1e-9
+NEARLY_ALONG = 0.99
+"""Cosine beyond which a link runs along its joint's axis."""
 Load = Callable[[Doings], Array]
 """What turns one motor at every point, N m or N, (m,)."""
 ROUGHLY = 0.3
@@ -41,7 +44,7 @@ def compliances(doings: Doings) -> list[Candidate]:
 
 
 def flexures(doings: Doings) -> list[Candidate]:
-    """A link turns about its middle under the moment that it passes on."""
+    """A link turns about its middle under the moment that it passes on, or bends as a beam that is clamped."""
     moment = doings.middle_moment
     if moment is None:
         return []
@@ -51,7 +54,12 @@ def flexures(doings: Doings) -> list[Candidate]:
         for i in range(min(doings.seen.joint_count, doings.seen.link.max()))
         if np.ptp(moment[:, i], axis=0).max() > LEAST_SHARE * max(largest, 1e-9)
     ]
-    return [_flexure(i, float(np.abs(moment[:, i]).max()), rough) for i in links for rough in (False, True)]
+    return [
+        _flexure(doings, i, float(np.abs(moment[:, i]).max()), bend, rough)
+        for i in links
+        for bend in (_hinged, _clamped)
+        for rough in (False, True)
+    ]
 
 
 def payloads(doings: Doings) -> list[Candidate]:
@@ -126,31 +134,65 @@ def _compliance(doings: Doings, joint: int, atom: str, load: Load) -> Candidate:
     )
 
 
-def _flexure(link: int, largest: float, rough: bool) -> Candidate:
+BEAM = ("its_length", "its_side", "its_height")
+Bend = Callable[[Doings, int, Array, Array], list[Column]]
+"""How a link gives about each of its axes, for a moment at its middle (m, 3) and a force that it carries (m, 3)."""
+
+
+def _flexure(doings: Doings, link: int, largest: float, bend: Bend, rough: bool) -> Candidate:
     def columns(doings: Doings) -> list[Column]:
-        moment, middle = doings.middle_moment[:, link], doings.loads.middle_m[link]
-        out = [_bend(link, k, moment[:, k], middle) for k in range(3)]
+        loads, payload_kg = doings.loads, doings.seen.payload_kg[:, None]
+        one_kg, own_kg = loads.force_kilogram[:, link], loads.carried_kg[link]
+        out = bend(doings, link, doings.middle_moment[:, link], (own_kg + payload_kg) * one_kg)
         if rough:
-            offset = doings.seen.payload_kg[:, None, None] * doings.loads.middle_offset[:, link]
-            out += [_bend(link, k, doings.loads.middle_own[:, link, k], middle) for k in range(3)]
-            out += [_bend(link, k, offset[:, k, c], middle) for k in range(3) for c in range(3)]
+            out += bend(doings, link, loads.middle_own[:, link], own_kg * one_kg)
+            offset = payload_kg[:, :, None] * loads.middle_offset[:, link]
+            out += [one for c in range(3) for one in bend(doings, link, offset[:, :, c], 0.0 * one_kg)]
         return out
 
-    names = tuple(f"give_about_{axis}_rad_per_nm" for axis in "xyz")
+    names = tuple(f"give_about_{axis}_rad_per_nm" for axis in BEAM)
     reference = (ANGLE / max(largest, 1e-9),) * 3
     if rough:
-        names += tuple(f"own_weight_give_about_{axis}_rad_per_nm" for axis in "xyz")
-        names += tuple(f"offset_{c}_times_give_about_{axis}_rad_per_nm" for axis in "xyz" for c in "xyz")
+        names += tuple(f"own_weight_give_about_{axis}_rad_per_nm" for axis in BEAM)
+        names += tuple(f"offset_{c}_times_give_about_{axis}_rad_per_nm" for c in "xyz" for axis in BEAM)
         reference += (ROUGHLY * reference[0],) * 3 + (NEAR_M * reference[0],) * 9
-    atom = "under weights that are roughly known" if rough else ""
-    return Candidate(Place("flexure", joint=link + 1), atom, names, columns, 2, reference)
+    words = (["as a clamped beam"] if bend is _clamped else []) + (["weights roughly known"] if rough else [])
+    return Candidate(Place("flexure", joint=link + 1), ", ".join(words), names, columns, 4, reference)
 
 
-def _bend(link: int, axis: int, angle: Array, middle: Array) -> Column:
-    """A link turns by an angle about an axis through its middle."""
-    away = np.cross(middle, np.eye(3)[axis])
-    column = [(Slot(Part.BEYOND, link, axis), angle)]
-    return column + [(Slot(Part.BEYOND, link, 3 + c), angle * away[c]) for c in range(3) if abs(away[c]) > 1e-12]
+def _hinged(doings: Doings, link: int, moment: Array, force: Array) -> list[Column]:
+    """The link turns about its middle."""
+    middle = doings.loads.middle_m[link]
+    out = []
+    for about in beam_axes(middle):
+        angle, motion = moment @ about, np.concatenate([about, np.cross(middle, about)])
+        out.append([(Slot(Part.BEYOND, link, c), angle * motion[c]) for c in range(6) if abs(motion[c]) > TINY])
+    return out
+
+
+def _clamped(doings: Doings, link: int, moment: Array, force: Array) -> list[Column]:
+    """The link bends as a cantilever (Euler and Bernoulli): its slope is a turn about the middle, its tip goes farther.
+
+    A force f at the end of a length l makes a slope f l^2 / 2 and a shift f l^3 / 3 for a stiffness of one; a turn
+    about the middle by that slope shifts the tip by f l^3 / 4 only.
+    """
+    along = 2 * doings.loads.middle_m[link]
+    out = []
+    for about, column in zip(beam_axes(along), _hinged(doings, link, moment, force), strict=True):
+        across = np.cross(about, along)
+        farther = (force @ across)[:, None] * across / 12
+        shifts = [(Slot(Part.BEYOND, link, 3 + c), farther[:, c]) for c in range(3) if abs(across[c]) > TINY]
+        out.append(column + shifts)
+    return out
+
+
+def beam_axes(along: Array) -> Array:
+    """Axes that a link bends and twists about, in its frame: along it, across its joint's axis, and square to both."""
+    length = float(np.linalg.norm(along))
+    x = along / length if length > TINY else np.array([1.0, 0.0, 0.0])
+    side = np.cross([0.0, 0.0, 1.0] if abs(x[2]) < NEARLY_ALONG else [0.0, 1.0, 0.0], x)
+    y = side / np.linalg.norm(side)
+    return np.array([x, y, np.cross(x, y)])
 
 
 def _payload(doings: Doings, heaviest: dict[int, float], logged: bool, centre: bool) -> Candidate:

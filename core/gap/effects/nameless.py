@@ -1,4 +1,5 @@
-"""Smooth functions without a name: of one joint's place, of the sense it came in, of time, of the whole configuration.
+"""Smooth functions without a name: of one joint's place, of the sense it came in, of time, of the configuration, alone
+or at one joint, of where a point lies in the room.
 
 They stand for whatever the library does not know, and tell where it acts.
 """
@@ -8,12 +9,15 @@ import numpy as np
 from core.gap.doings import Doings
 from core.gap.effects.candidate import ANGLE, LENGTH, Candidate, Column, drive, motors
 from core.gap.result import Place
-from core.gap.sim import Part, Slot
+from core.gap.sim import PRODUCTS, Part, Slot
 from core.geometry import Array
 
-JOINT, SENSE, TIME, CONFIGURATION, LOAD = "?joint", "?sense", "?time", "?configuration", "?load"
+JOINT, SENSE, TURN, TIME = "?joint", "?sense", "?turn", "?time"
+CONFIGURATION, ROOM, LOAD = "?configuration", "?room", "?load"
 BUMPS, TIME_BUMPS, WAVES = 9, 11, 24
 SEED = 3
+BEND = 1.5e-4
+"""Of the room that is taken as likely, m on a metre squared."""
 
 
 def nameless(doings: Doings) -> list[Candidate]:
@@ -21,9 +25,10 @@ def nameless(doings: Doings) -> list[Candidate]:
     out = [_joint(doings, j) for j in motors(doings)]
     if doings.past.complete:
         out += [_sense(doings, j) for j in motors(doings)]
+    out += [_turn(doings, j) for j in motors(doings)]
     if np.ptp(doings.seen.payload_kg) > 0:
         out.append(_load(doings))
-    return [*out, _time(), _configuration(doings)]
+    return [*out, _time(), _configuration(doings), _room()]
 
 
 def _bumps(x: Array, low: float, high: float, count: int) -> Array:
@@ -74,6 +79,27 @@ def _waves(doings: Doings) -> tuple[Array, Array]:
     direction = rng.normal(0, 1.8, (WAVES, len(span))) / span
     direction[:, doings.seen.span < 1e-6] = 0.0
     return direction, rng.uniform(0, 2 * np.pi, WAVES) - direction @ low
+
+
+def _turn(doings: Doings, joint: int) -> Candidate:
+    """A joint's error that depends on where others stand as well."""
+    direction, phase = _waves(doings)
+
+    def columns(doings: Doings) -> list[Column]:
+        waves = np.cos(doings.active @ direction.T + phase)
+        return [drive(doings, joint, waves[:, w]) for w in range(WAVES)]
+
+    names = tuple(f"wave_{w}" for w in range(WAVES))
+    return Candidate(Place(TURN, joint=joint + 1), "", names, columns, 1, (ANGLE,) * WAVES)
+
+
+def _room() -> Candidate:
+    def columns(doings: Doings) -> list[Column]:
+        ones = np.ones(doings.count)
+        return [[(Slot(Part.ROOM, p, k), ones)] for p in range(len(PRODUCTS)) for k in range(3)]
+
+    names = tuple(f"bend_{p}_{k}" for p in range(len(PRODUCTS)) for k in range(3))
+    return Candidate(Place(ROOM, variable="configuration"), "", names, columns, 1, (BEND,) * len(names))
 
 
 def _configuration(doings: Doings) -> Candidate:

@@ -33,9 +33,13 @@ def geometry_slots(doings: Doings) -> list[Slot]:
 
 
 def wobbles(doings: Doings) -> list[Candidate]:
-    """The axis tilts or shifts once and twice a turn as the joint turns."""
-    turning = [j for j in motors(doings) if not doings.seen.chain.sliding[j]]
-    return [_wobble(j, axes) for j in turning for axes in ((0, 1), (3, 4, 5), (0, 1, 3, 4, 5))]
+    """The axis tilts or shifts once and twice a turn as the joint turns; a guide is not straight along its way."""
+    out = []
+    for j in motors(doings):
+        tilts, shifts = (0, 1, 2) if doings.seen.chain.sliding[j] else (0, 1), (3, 4, 5)
+        ways = ((tilts, "tilts"), (shifts, "shifts"), ((*tilts, *shifts), "tilts and shifts"))
+        out += [_wobble(doings, j, axes, atom) for axes, atom in ways]
+    return out
 
 
 def thermals(doings: Doings) -> list[Candidate]:
@@ -58,20 +62,26 @@ def _geometry(link: int) -> Candidate:
     return Candidate(Place("geometry", frame=link + 1), "", LINK_NAMES, columns, 1, reference)
 
 
-def _wobble(joint: int, axes: tuple[int, ...]) -> Candidate:
-    def columns(doings: Doings) -> list[Column]:
+def _wobble(doings: Doings, joint: int, axes: tuple[int, ...], atom: str) -> Candidate:
+    orders, turn = (1, 2), ("", "_of_twice", "_of_three_times")
+    per_unit, middle = 1.0, 0.0
+    if doings.seen.chain.sliding[joint]:
+        # Half waves of what was travelled are smooth functions with any ends.
         x = doings.active[:, joint]
-        waves = (np.sin(x), np.cos(x), np.sin(2 * x), np.cos(2 * x))
+        orders, per_unit, middle = (1, 2, 3), np.pi / float(np.ptp(x)), float(x.min() + x.max()) / 2
+
+    def columns(doings: Doings) -> list[Column]:
+        x = per_unit * (doings.active[:, joint] - middle)
+        waves = [wave(order * x) for order in orders for wave in (np.sin, np.cos)]
         return [[(Slot(Part.AXIS, joint, k), wave)] for k in axes for wave in waves]
 
-    waves = ("sine", "cosine", "sine_of_twice", "cosine_of_twice")
+    waves = [f"{wave}{turn[order - 1]}" for order in orders for wave in ("sine", "cosine")]
     names = tuple(
         f"{'tilt_about' if k < 3 else 'shift_along'}_{'xyz'[k % 3]}_{wave}_{'rad' if k < 3 else 'm'}"
         for k in axes
         for wave in waves
     )
     reference = tuple(ANGLE if k < 3 else LENGTH for k in axes for _ in waves)
-    atom = {2: "tilts", 3: "shifts", 5: "tilts and shifts"}[len(axes)]
     return Candidate(Place("axis_wobble", joint=joint + 1), atom, names, columns, 3, reference)
 
 
