@@ -16,6 +16,7 @@ from core.gap.kept_out import KNOWN, KeptOut
 from core.gap.library import candidates
 from core.gap.observations import Observations
 from core.gap.placement import place, placement_slots, with_placement
+from core.gap.plainer import plainer
 from core.gap.problem import Problem, pose_problem
 from core.gap.scatter import joint_scatter
 from core.gap.search import Found, search
@@ -42,6 +43,8 @@ MOST_FLEXIBLE, MOST_SPENT = 4, 0.08
 PASSES = 3
 BENT = 0.15
 """Curvature below this share of the noise does not matter."""
+NOTABLY = 0.002
+"""Share of the log evidence below which better atoms are not worth another look."""
 LEAST_FREEDOM = 12
 """Residuals that a fit leaves free; fewer say nothing of the noise."""
 BEYOND_STATEMENT = 6.0
@@ -161,13 +164,16 @@ def analyse(
         learnt = _learn(told_doings, problem, best, first, told, steps=turn == 0)
         fresh = [one for one in learnt.sharper if one.place.effect not in without]
         straight = learnt.bent_m2 < BENT**2 * noise.floor_m2.mean()
-        settled = _settled(noise, learnt.noise) and straight and not _matter(fresh, problem, best)
+        better = bool(fresh) if turn == 0 else _matter(fresh, problem, best)
+        settled = _settled(noise, learnt.noise) and straight and not better
         if settled or turn == PASSES - 1:
             break
         noise, library = learnt.noise, [*library, *fresh]
         if not straight:
             sim, aim = learnt.sim, learnt.residual_m
-    return Analysis(sim, told_doings, problem, *best, noise, residual_m, placed)
+    evidence, prior, threshold, found, given = best
+    found = plainer(problem, evidence, found, given)
+    return Analysis(sim, told_doings, problem, evidence, prior, threshold, found, given, noise, residual_m, placed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +199,7 @@ def _settled(before: NoiseFound, after: NoiseFound) -> bool:
 
 
 def _matter(fresh: list[Candidate], problem: Problem, best: tuple[Evidence, float, float, Found, Chosen]) -> bool:
-    """Whether the search would choose any of fresh candidates beside or instead of what it found."""
+    """Whether fresh candidates beside or instead of what was found say notably more."""
     _, prior, threshold, found, given = best
     known = {(one.place, one.atom) for one in problem.candidates}
     fresh = [one for one in fresh if (one.place, one.atom) not in known]
@@ -209,7 +215,9 @@ def _matter(fresh: list[Candidate], problem: Problem, best: tuple[Evidence, floa
     )
     there = Chosen(tuple(range(len(given.groups))), given.sizes)
     again = search(few.evidence(prior), np.arange(len(given.groups), len(few.candidates)), few.cost, threshold, there)
-    return max(again.chosen.groups, default=0) >= len(old.groups)
+    before = few.evidence(prior).given(Chosen(tuple(range(len(old.groups))), old.sizes))
+    before -= float(few.cost[len(given.groups) : len(old.groups)].sum())
+    return again.log_evidence > before + threshold + NOTABLY * max(before, 0.0)
 
 
 def _first_noise(told: Doings, residual_m: Array, covariance: Array, weight: Array) -> NoiseFound:

@@ -19,13 +19,12 @@ from core.gap.evidence import Chosen, joined, without
 from core.gap.folds import blocks
 from core.gap.kept_out import KeptOut, mean_square
 from core.gap.observations import Observations, observe
-from core.gap.open_set import AT_FLOOR, EVERYWHERE, Judge, Stand, stands, unknown_at
+from core.gap.open_set import AT_FLOOR, Judge, Stand
 from core.gap.placement import placement_slots
-from core.gap.posterior import adequate, rivals, sufficient, twins
+from core.gap.posterior import BESIDE_UNKNOWN, adequate, rivals, twins
 from core.gap.problem import Problem
 from core.gap.reliability import reliability
 from core.gap.result import (
-    UNKNOWN,
     Cause,
     Cell,
     LeftTest,
@@ -36,6 +35,7 @@ from core.gap.result import (
     Rivals,
     Verdict,
 )
+from core.gap.said import Said, chosen_of, told_stands
 from core.gap.transfer import transfers
 from core.gap.warnings_of import warnings_of
 from core.gap.where import where
@@ -46,16 +46,7 @@ from core.measurements import Campaign
 UNKNOWN_FIRST, UNKNOWN_BESIDE = 0.9, 0.35
 """That something without a name acts at that joint or variable, where it is the strongest that is told, and where it
 is told beside others; as often as it was so in simulated worlds."""
-TOLD_SHARE = 0.01
-"""Of the gap: a change of geometry that closes less, or a name that adds less to something unknown, is not told."""
 HOLD_OUT = "fifths of each arc and regions of the joint space, each predicted from the others"
-SURE_OF_REST = 0.1
-"""What nameless functions must still close, as a share of the gap, to be told as something unknown."""
-MANY, MANY_LEAVE = 3, 4.0
-"""Names that together leave too much: none of their joints is where something acts. More of them than that must leave
-less than so many floors (mean squares), or they only imitate something else."""
-FAINT = 1.3
-"""Times the noise (mean squares) of what does not stand out of it by itself."""
 CLOSED = 0.9
 """Share of the gap beyond the floor that causes must close to explain it."""
 ALL_NEEDED = 0.7
@@ -156,6 +147,7 @@ class Findings:
             a.found.chosen,
             self.worth,
             a.given,
+            a.noise.excess,
         )
 
     @cached_property
@@ -176,147 +168,21 @@ class Findings:
     @cached_property
     def stands(self) -> list[Stand]:
         """Named causes, the one that the data say most for first, and unknown ones."""
-        judged = self._told_stands() if self.told else [*self._geometry_stands(), *stands(self.judge)]
-        named = [one for one in judged if not one.unknown]
-        order = sorted(named, key=lambda one: self._evidence_lost(one, named), reverse=True)
-        order = [one for one in order if self.told or self._matters(one, order)]
-        if self.told:
-            return order
-        if self._faint(order):
-            order = []
-        unknown = self._unknown([one for one in judged if one.unknown], order)
-        one = None if self.analysis.given.groups else self._one_for_all(order)
-        if one is not None:
-            rest = [other for other in unknown if not other.place.same_as(one.place)]
-            return [one, *self._adding(order, [one, *rest]), *rest]
-        if order and not self.analysis.given.groups and not self._enough(order):
-            return [*self._stood_in_for(order, unknown), *(self._adding(order, unknown) if unknown else order)]
-        return self._strongest_first(order, unknown)
-
-    def _faint(self, named: list[Stand]) -> bool:
-        """Whether names close little of what hardly stands out of the noise."""
-        closed = self.judge.base_m2 - self.judge.square(_chosen(named))
-        return self.judge.base_m2 < FAINT * self.floor_m2 and closed < 0.5 * self.judge.closable_m2
-
-    def _enough(self, named: list[Stand]) -> bool:
-        """Whether names close what can be closed; many together may do so for anything, but not down to the noise."""
-        chosen = _chosen(named)
-        if len(named) > MANY and self.judge.open.square_m2(chosen) > MANY_LEAVE * self.judge.floor_m2:
-            return False
-        return sufficient(self.judge, chosen) >= 0.5
-
-    def _one_for_all(self, named: list[Stand]) -> Stand | None:
-        """One thing without a name that leaves less of kept-out points than names at several places; None: none."""
-        judge = self.judge
-        if len({judge.variable(one.place) for one in named}) < 2 or not judge.local:
-            return None
-        left = {variable: judge.open.square_m2(chosen) for variable, chosen in judge.local.items()}
-        best = min(left, key=left.__getitem__)
-        by_names = judge.open.square_m2(_chosen(named))
-        if by_names < AT_FLOOR * judge.floor_m2 or by_names < left[best]:
-            return None
-        return Stand(unknown_at(best), judge.local[best].groups, judge.local[best].sizes, 0.0)
-
-    def _stood_in_for(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
-        """What names that leave too much most probably stand in for: something at their joint, or everywhere."""
-        lost = self._lost_m2([*named, *unknown])[len(named) :]
-        unknown = [unknown[k] for k in np.argsort(lost)[::-1]]
-        if unknown and len(named) < MANY:
-            return unknown
-        place = self._foremost(named)
-        same = [one for one in unknown if one.place.same_as(place)] or [Stand(place, (), (), 0.0)]
-        return [*same, *(one for one in unknown if not one.place.same_as(place))]
-
-    def _foremost(self, named: list[Stand]) -> Place:
-        """Where names stand in for something: their common variable, or that of the best functions without a name."""
-        variables = {self.judge.variable(one.place) for one in named}
-        if len(variables) == 1:
-            return unknown_at(variables.pop())
-        best = [self.judge.problem.candidates[g].place for g in self.judge.lone.groups[:1]]
-        return replace(best[0], effect=UNKNOWN) if best else unknown_at("configuration")
-
-    def _strongest_first(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
-        """Names in their order; before them what has no name and closes more than any: names must add to it then."""
-        lost = self._lost_m2([*named, *unknown])
-        most = max(lost[: len(named)], default=np.inf) + SURE_OF_REST * self.judge.closable_m2
-        first = [one for one, m2 in zip(unknown, lost[len(named) :], strict=True) if m2 > most]
-        told = self._adding(named, unknown) if first else named
-        return [*first, *told, *(one for one in unknown if one not in first)]
-
-    def _adding(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
-        """Names that add to what has none."""
-        least = TOLD_SHARE * self.judge.closable_m2
-        lost = self._lost_m2([*named, *unknown])
-        return [one for one, m2 in zip(named, lost, strict=False) if m2 > least or self._is_given(one)]
-
-    def _lost_m2(self, told: list[Stand]) -> list[float]:
-        """What each of several closes when all others are given, m^2."""
-        whole = self.judge.square(_chosen(told))
-        return [self.judge.square(_chosen([o for o in told if o is not one])) - whole for one in told]
+        return told_stands(self.analysis) if self.told else Said(self.analysis, self.judge).stands()
 
     @cached_property
     def named(self) -> list[Stand]:
         return [one for one in self.stands if not one.unknown]
 
-    def _evidence_lost(self, stand: Stand, named: list[Stand]) -> float:
-        """What the data say for one cause when all others are given: geometry can move much that placing takes back."""
-        evidence, everything = self.analysis.evidence, joined(_chosen(named), self.analysis.given)
-        return evidence.given(everything) - evidence.given(without(everything, stand.groups))
-
-    def _is_given(self, stand: Stand) -> bool:
-        return bool(stand.groups) and stand.groups[0] in self.analysis.given.groups
-
-    def _matters(self, stand: Stand, others: list[Stand]) -> bool:
-        """Whether geometry that is fitted anyway is worth telling of."""
-        if not self._is_given(stand):
-            return True
-        a = self.analysis
-        known = without(joined(a.given, self.worth), stand.groups)
-        if not a.evidence.gains(np.array(stand.groups), known).evidence[0] > 0:
-            return False
-        rest = _chosen([one for one in others if one is not stand])
-        kept, closable = self.judge.kept_out, self.judge.closable_m2
-        return kept.square_m2(rest) - kept.square_m2(joined(rest, _chosen([stand]))) > TOLD_SHARE * closable
-
-    def _told_stands(self) -> list[Stand]:
-        everything = self.analysis.everything
-        return [
-            Stand(self.analysis.problem.candidates[g].place, (g,), (s,), 1.0)
-            for g, s in zip(everything.groups, everything.sizes, strict=True)
-        ]
-
-    def _geometry_stands(self) -> list[Stand]:
-        given = self.analysis.given
-        candidates = self.analysis.problem.candidates
-        return [Stand(candidates[g].place, (g,), (s,), 1.0) for g, s in zip(given.groups, given.sizes, strict=True)]
-
-    def _unknown(self, located: list[Stand], named: list[Stand]) -> list[Stand]:
-        """What acts without a name: at places where names failed, and where all names leave something."""
-        judge, out = self.judge, list(located)
-        so_far = _chosen([*named, *located])
-        left = judge.square(so_far)
-        rest = judge.rest if named or located else judge.lone
-        if rest.groups and left - judge.square(joined(so_far, rest)) > SURE_OF_REST * judge.closable_m2:
-            place = judge.problem.candidates[rest.groups[0]].place
-            unknown = Place(UNKNOWN, joint=place.joint, variable=place.variable)
-            if not any(one.place.same_as(unknown) for one in out):
-                out.append(Stand(unknown, rest.groups, rest.sizes, 0.0))
-        noise = self.analysis.noise
-        known = [one.place for one in (*out, *named)]
-        told = noise.scattering in {one.joint for one in known} or any(one.effect in EVERYWHERE for one in known)
-        if noise.scattering is not None and not told and (noise.excess > 1 or noise.unlike_statement):
-            out.append(Stand(Place(UNKNOWN, joint=noise.scattering), (), (), 0.0))
-        return out
-
     @cached_property
     def chosen(self) -> Chosen:
         """All named causes."""
-        return joined(_chosen(self.named), self.analysis.given)
+        return joined(chosen_of(self.named), self.analysis.given)
 
     @cached_property
     def wide(self) -> Wide:
         """All points with every candidate that stands or describes what does not."""
-        groups = joined(self.chosen, _chosen(self.stands)).groups
+        groups = joined(self.chosen, chosen_of(self.stands)).groups
         return widened(self.analysis, self.seen, groups, self.chosen)
 
     @cached_property
@@ -326,7 +192,7 @@ class Findings:
     @cached_property
     def kept(self) -> KeptOut:
         """Models of causes with the small changes of geometry as they are: what each cause closes."""
-        return self._kept(_chosen(self.stands), self.judge.geometry)
+        return self._kept(chosen_of(self.stands), self.judge.geometry)
 
     @cached_property
     def honest(self) -> KeptOut:
@@ -413,10 +279,6 @@ class Findings:
         return Verdict.EXPLAINED if closed and not unknown else Verdict.PARTLY_EXPLAINED
 
 
-def _chosen(some: Sequence[Stand]) -> Chosen:
-    return joined(*(Chosen(one.groups, one.sizes) for one in some))
-
-
 def _report(campaign: Campaign, arm: CalibratedArm | None, found: Findings) -> Diagnosis:
     a = found.analysis
     causes = _causes(found)
@@ -473,8 +335,8 @@ def _causes(found: Findings) -> tuple[Cause, ...]:
     base = found.square_m2(Chosen())
     so_far, before, out = Chosen(), base, []
     for stand in found.stands:
-        own = _chosen([stand])
-        others = _chosen([one for one in found.named if one is not stand])
+        own = chosen_of([stand])
+        others = chosen_of([one for one in found.named if one is not stand])
         so_far = joined(so_far, own)
         after = found.square_m2(so_far)
         last = found.square_m2(others) - found.square_m2(joined(others, own))
@@ -505,7 +367,8 @@ def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, 
         # The geometry as a whole is settled by points kept out; this is about the one frame.
         return _significance(found, stand), (stand.place,)
     probability, alike = twins(found.judge, stand, rivals(found.judge, stand, others))
-    return probability * adequate(found.judge, _chosen(found.named), _chosen(found.stands)), alike
+    beside = BESIDE_UNKNOWN if found.stands[0].unknown else 1.0
+    return beside * probability * adequate(found.judge, chosen_of(found.named), chosen_of(found.stands)), alike
 
 
 def _significance(found: Findings, stand: Stand) -> float:
@@ -544,10 +407,10 @@ def _position(problem: Problem, chosen: Chosen, group: int) -> int:
 def _shift(found: Findings, stand: Stand) -> Array:
     """What one cause moves when all are fitted together, (m, 3)."""
     problem = found.wide.problem
-    chosen = found.wide.chosen(joined(found.chosen, _chosen([stand])))
+    chosen = found.wide.chosen(joined(found.chosen, chosen_of([stand])))
     index, numbers, _ = found.kept.fitted(chosen)
     out = np.zeros_like(problem.residual_m)
-    for g in found.wide.chosen(_chosen([stand])).groups:
+    for g in found.wide.chosen(chosen_of([stand])).groups:
         at = _position(problem, chosen, g)
         own = slice(at, at + problem.slices[g].stop - problem.slices[g].start)
         out += found.kept.plain[:, :, index[own]] @ numbers[own]
@@ -577,7 +440,7 @@ def _best_closure(found: Findings) -> float:
         return 0.0
     base = found.square_m2(Chosen())
     total = max(found.gap_m2 - found.floor_m2, 1e-300)
-    return float((base - found.square_m2(_chosen(found.named[:1]))) / total)
+    return float((base - found.square_m2(chosen_of(found.named[:1]))) / total)
 
 
 def _corrected(arm: CalibratedArm | None, found: Findings) -> CorrectedSim:

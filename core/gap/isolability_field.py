@@ -12,7 +12,7 @@ from core.gap.effects.candidate import Candidate
 from core.gap.evidence import Chosen, Evidence
 from core.gap.expected_evidence import expected_evidence, granting
 from core.gap.parameter_units import LARGEST
-from core.gap.posterior import FORM_ERROR
+from core.gap.posterior import blunted
 from core.gap.problem import Problem
 from core.gap.result import Place
 from core.geometry import Array
@@ -122,9 +122,7 @@ class Field:
             best[:, p] = score[:, mine].max(axis=1)
         rows, own = np.arange(len(acting)), self.place[acting]
         right = best[rows, own][:, None]
-        # Rough forms of effects decide nothing; as in core/gap/posterior.py.
-        sure = (right - best) / np.sqrt(1 + (FORM_ERROR * np.maximum(right, 0.0)) ** 2)
-        apart = np.sqrt(2 * np.maximum(sure, 0.0))
+        apart = np.sqrt(2 * np.maximum(blunted(right - best, right), 0.0))
         apart[rows, own] = np.inf
         return Separations(apart, rival)
 

@@ -21,7 +21,9 @@ OF_DRIVES = (
     lost_motion.hystereses,
     elastic.compliances,
     elastic.payloads,
+    structure.wobbles,
 )
+"""What may sit behind a branching of motors, or depend on the joint's own angle there."""
 FAMILIES = (
     drives.zero_offsets,
     drives.ratios,

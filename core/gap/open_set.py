@@ -21,7 +21,8 @@ SMOOTH = frozenset({"zero_offset", "ratio", "eccentricity", "linkage", "axis_wob
 """Smooth functions of one joint; so is a mesh with fewer waves a turn than ``RIPPLE``."""
 RIPPLE = 6.0
 EXACT, EXACTLY = frozenset({"zero_offset", "ratio", "eccentricity", "mesh"}), 0.96
-"""Smooth effects whose forms are exact must close nearly all: whatever is smooth looks like them otherwise."""
+"""Smooth effects whose forms are exact must close nearly all, down to the noise with all else that was found: whatever
+is smooth looks like them otherwise."""
 LOCALLY = 0.92
 """Share of what nameless functions close that a name must close to stand."""
 MOSTLY = 0.85
@@ -71,6 +72,8 @@ class Judge:
     """Those of what was found that are to be judged."""
     given: Chosen = NOTHING
     """Geometry that needs no judgement: it is there whatever else is."""
+    excess: float = 1.0
+    """Variance that is left over the noise's when everything flexible has been fitted."""
 
     @property
     def everything(self) -> Chosen:
@@ -143,6 +146,11 @@ class Judge:
         """With the geometry that is given."""
         return self.kept_out.square_m2(joined(self.given, chosen))
 
+    def expected_m2(self, chosen: Chosen) -> float:
+        """What noise lets expect there, with fits as uncertain as they are."""
+        noise_m2 = np.full(len(self.fold), self.floor_m2)
+        return self.kept_out.expected_m2(joined(self.given, chosen), noise_m2)
+
     def variable(self, place: Place) -> str:
         """The variable whose nameless functions rival a cause."""
         if place.effect in BY_TIME:
@@ -172,6 +180,10 @@ class Judge:
 def stands(judge: Judge) -> list[Stand]:
     """What can be said of each place where something acts, strongest first."""
     kept = _predicting(judge, _worthy(judge))
+    lost = without(judge.worth, kept.groups)
+    if lost.groups and judge.square(judge.found) < AT_FLOOR * judge.floor_m2:
+        # What the data say most for predicts nothing alone, but all together down to the noise: they belong together.
+        kept = _predicting(judge, judge.found)
     out = []
     by_variable: dict[str, list[int]] = {}
     for k, group in enumerate(kept.groups):
@@ -229,12 +241,16 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Cho
     local = judge.local.get(variable, Chosen())
     spot = Spot(judge, here, local, elsewhere)
     named = _names(spot)
-    first = judge.problem.candidates[here.groups[spot.order[0]]]
-    complete = small.groups and judge.square(joined(elsewhere, here, small)) < AT_FLOOR * judge.floor_m2
-    if not named and complete and (not _smooth(first) or spot.share(spot.order[:1]) >= MOSTLY):
+    if not named and judge.square(joined(elsewhere, here, small)) < AT_FLOOR * judge.floor_m2:
         # Small causes at the same place are real where they complete the others down to the noise; but smooth
         # functions of one joint together imitate any other, where none of them does most of it alone.
-        named = _names(replace(spot, elsewhere=joined(elsewhere, small)))
+        first = spot.order[0]
+        if small.groups and not _smooth(spot.candidate(first)):
+            named = _names(replace(spot, elsewhere=joined(elsewhere, small)))
+        if not named and spot.share([first]) >= MOSTLY:
+            beside = without(here, [here.groups[k] for k in spot.forms(first)])
+            alone = replace(spot, here=_pick(here, spot.forms(first)), elsewhere=joined(elsewhere, small, beside))
+            named = _names(alone)
     if named:
         return named
     groups = joined(local, here)
@@ -283,28 +299,30 @@ class Spot:
         alone = [self.closes_m2([k]) for k in range(len(self.here.groups))]
         return [int(k) for k in np.argsort(alone)[::-1]]
 
+    @cached_property
+    def to_the_noise(self) -> bool:
+        """Whether all that was found leaves no more than noise and what nothing flexible could fit."""
+        everything = joined(self.elsewhere, self.here, self.judge.found)
+        return self.judge.square(everything) < AT_FLOOR * self.judge.excess * self.judge.expected_m2(everything)
+
     def candidate(self, k: int) -> Candidate:
         return self.judge.problem.candidates[self.here.groups[k]]
 
-    @cached_property
-    def complete(self) -> bool:
-        """Whether all names here leave no more than noise."""
-        return self.judge.square(joined(self.elsewhere, self.here)) < AT_FLOOR * self.judge.floor_m2
-
     def forms(self, k: int) -> list[int]:
-        """A name with all that describes the same cause: of effects whose forms are rough, and orders of one mesh."""
+        """A name with all that describes the same cause, of effects whose forms are rough."""
         mine = self.candidate(k).place
         same = [k, *(other for other in self.order if other != k and self.candidate(other).place.same_as(mine))]
-        orders = mine.effect == "mesh" and self.complete and self.share([k]) >= MOSTLY
-        return same if mine.effect in COMPLETED or orders else [k]
+        return same if mine.effect in COMPLETED else [k]
 
 
 def _names(spot: Spot) -> list[Stand]:
     """The names that suffice at one variable: one, several forms of one, or two; none: nameless functions do better."""
     first = spot.order[0]
     forms = spot.forms(first)
-    exact = spot.candidate(first).place.effect in EXACT and _smooth(spot.candidate(first))
-    enough = spot.share([first]) >= (EXACTLY if exact else LOCALLY)
+    if spot.candidate(first).place.effect in EXACT and _smooth(spot.candidate(first)):
+        enough = spot.share([first]) >= EXACTLY and spot.to_the_noise
+    else:
+        enough = spot.share([first]) >= LOCALLY
     if enough or (len(forms) > 1 and spot.share(forms) >= LOCALLY):
         share = spot.share([first] if enough else forms)
         second = _second(spot, forms)

@@ -16,12 +16,16 @@ from core.geometry import Array
 NO_CAUSE = Place("none")
 FORM_ERROR = 0.002
 """Share of the evidence that rough forms of effects can be wrong by."""
+LOST_MOTION, LOST_MOTION_ERROR = {"backlash", "hysteresis"}, 0.04
+"""The same between play and hysteresis of a joint, of which no form says how it floats."""
 NAMED_AT, NAMED_WIDTH = LOCALLY, 0.012
 CLOSES_AT, CLOSES_WIDTH = 0.82, 0.03
 """Share of the gap beyond the floor that names close together at which they are as likely wrong as right: where they
 leave more, something without a name is at work and they stand in for it. From simulated worlds with known causes."""
 LEAST, MOST = 0.1, 0.97
 """However badly or well names close, so often they are right in those worlds."""
+BESIDE_UNKNOWN = 0.4
+"""How much less a name is worth that is told after something without a name."""
 ONE_MOVES = 0.5
 """Where one joint alone moves, everything is some function of it: no name is likelier than not."""
 TWIN_ODDS = 0.05
@@ -29,28 +33,34 @@ TWIN_ODDS = 0.05
 
 
 def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, float]]:
-    """Named places with their probabilities, given the other causes, most probable first."""
+    """Named places with their probabilities, given the other causes, most probable first.
+
+    What would explain more in place of a cause speaks against it only as far as it leaves the cause nothing to explain.
+    """
     named = judge.problem.named
-    known = without(joined(judge.given, others, _elsewhere(judge, stand)), stand.groups)
+    rest = without(joined(judge.given, others, _elsewhere(judge, stand)), stand.groups)
+    known = joined(rest, Chosen(stand.groups[1:], stand.sizes[1:]))
     gains = judge.evidence.gains(named, known)
     score = gains.evidence - judge.problem.cost[named]
     score[np.isin(named, known.groups)] = -np.inf
     places: list[Place] = []
-    best: list[float] = []
-    wide: list[int] = []
+    best: list[int] = []
     for k in np.argsort(score)[::-1]:
-        if not np.isfinite(score[k]):
-            continue
         place = judge.problem.candidates[named[k]].place
-        if not any(place.same_as(known) for known in places):
+        if np.isfinite(score[k]) and not any(place.same_as(known) for known in places):
             places.append(place)
-            best.append(float(score[k]))
-            wide.append(judge.problem.width(named[k]))
+            best.append(int(k))
+    mine = _index(places, stand.place)
     # No cause at all is one more possibility, without evidence and without cost.
+    evidence = np.append(score[best], 0.0)
+    for k in np.flatnonzero(evidence > evidence[mine]):
+        beside = known.plus(int(named[best[k]]), float(gains.size[best[k]]))
+        adds = judge.evidence.gains(named[best[mine : mine + 1]], beside).evidence[0]
+        evidence[k] = min(evidence[k], evidence[mine] - adds + judge.problem.cost[named[best[mine]]])
+    wide = np.array([*(judge.problem.width(named[k]) for k in best), 0])
     places.append(NO_CAUSE)
-    best.append(0.0)
-    wide.append(0)
-    weight = np.exp(_odds(np.array(best), np.array(wide), _index(places, stand.place)))
+    rough = np.array([LOST_MOTION_ERROR if _both_lose_motion(stand.place, one) else FORM_ERROR for one in places])
+    weight = np.exp(_odds(evidence, wide, mine, rough))
     order = np.argsort(-weight, kind="stable")
     return [(places[k], float(weight[k] / weight.sum())) for k in order]
 
@@ -65,15 +75,24 @@ def _index(places: list[Place], place: Place) -> int:
     return next((k for k, one in enumerate(places) if one.same_as(place)), 0)
 
 
-def _odds(evidence: Array, width: np.ndarray, mine: int) -> Array:
+def _both_lose_motion(one: Place, other: Place) -> bool:
+    return one.joint == other.joint and {one.effect, other.effect} == LOST_MOTION
+
+
+def _odds(evidence: Array, width: np.ndarray, mine: int, rough: Array | float = FORM_ERROR) -> Array:
     """Log odds of each place against the one that stands, which take the roughness of all forms into account.
 
     A form that is free to do more and yet explains no more does not profit from that: what stands needs no repair.
     """
     odds = evidence - evidence[mine]
     idle = (width > width[mine]) & (odds < 0)
-    odds = np.where(idle, odds, odds / np.sqrt(1 + (FORM_ERROR * evidence.max()) ** 2))
+    odds = np.where(idle, odds, blunted(odds, evidence.max(), rough))
     return odds - odds.max()
+
+
+def blunted(difference: Array, most: Array | float, rough: Array | float = FORM_ERROR) -> Array:
+    """Differences of evidence by what forms are worth that explain so much at most."""
+    return difference / np.sqrt(1 + (rough * np.maximum(most, 0.0)) ** 2)
 
 
 def adequate(judge: Judge, named: Chosen, everything: Chosen) -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.gap.evidence import Evidence, best_sizes
-from core.gap.posterior import FORM_ERROR
+from core.gap.posterior import blunted
 from core.gap.problem import Problem
 from core.gap.result import Reliability
 from core.geometry import Array
@@ -39,8 +39,7 @@ def reliability(problem: Problem, evidence: Evidence, threshold: float) -> Relia
     by_place = np.full((places.max() + 1, score.shape[1]), -np.inf)
     np.maximum.at(by_place, places[problem.named], score[problem.named])
     top = by_place.max(axis=0)
-    odds = np.exp((by_place - top) / np.sqrt(1 + (FORM_ERROR * np.maximum(top, 0.0)) ** 2))
-    said = 1 / np.sum(odds, axis=0)
+    said = 1 / np.sum(np.exp(blunted(by_place - top, top)), axis=0)
     right = by_place.argmax(axis=0) == places[drawn.truth]
     return _table(said[top > threshold], right[top > threshold])
 

@@ -120,7 +120,7 @@ class TestExpectedEvidence:
 
     def test_it_is_the_mean_over_drawn_worlds(self) -> None:
         """Where one scale fits all worlds best; a scale chosen for each world gains a little more."""
-        problem, rng, draws = small_problem(), np.random.default_rng(4), 4000
+        problem, rng, draws = small_problem(), np.random.default_rng(4), 40_000
         groups = plain(problem, 10)
         evidence = granting(problem, Chosen(), groups)
         acting, size = 3, 0.6

@@ -17,6 +17,7 @@ MOST_TURNS = 60.0
 """Of a spindle over the span of a joint that slides."""
 SQUARE_AT_RAD = np.deg2rad([45.0, 60.0, 75.0, 90.0, 105.0, 120.0, 135.0])
 """Angle of the crank to the ground bar in the middle of the joint's span."""
+OF_TIMES = {1: "", 2: "_of_twice"}
 FLATTEST = 0.12
 """A four-bar nearer its dead point than this sine is not a candidate."""
 
@@ -67,13 +68,18 @@ def order_of(candidate: Candidate) -> float | None:
 
 
 def periodic(candidate: Candidate, doings: Doings, order: float) -> list[Candidate]:
-    """The same periodic error with another order.
+    """The same periodic error with another order; of a mesh also with its double, as teeth with unlike flanks make it.
 
     What comes once a turn of a spindle and what comes several times cannot be told apart where its lead is not known.
     """
     joint = candidate.place.joint - 1
     effects = ("eccentricity", "mesh") if doings.seen.chain.sliding[joint] else (candidate.place.effect,)
-    return [_harmonic(effect, doings, joint, order, candidate.choices) for effect in effects]
+    return [
+        _harmonic(effect, doings, joint, order, candidate.choices, doubled)
+        for effect in effects
+        for doubled in (False, True)
+        if effect == "mesh" or not doubled
+    ]
 
 
 def linkages(doings: Doings) -> list[Candidate]:
@@ -113,10 +119,12 @@ def _drive(effect: str, joint: int, name: str, feature: Callable[[Array], Array]
     return Candidate(Place(effect, joint=joint + 1), "", (name,), columns, reference=(ANGLE,))
 
 
-def _harmonic(effect: str, doings: Doings, joint: int, order: float, choices: int) -> Candidate:
+def _harmonic(effect: str, doings: Doings, joint: int, order: float, choices: int, doubled: bool = False) -> Candidate:
+    times = (1, 2) if doubled else (1,)
+
     def columns(doings: Doings) -> list[Column]:
         x = order * doings.active[:, joint]
-        return [drive(doings, joint, np.sin(x)), drive(doings, joint, np.cos(x))]
+        return [drive(doings, joint, wave(k * x)) for k in times for wave in (np.sin, np.cos)]
 
     of = unit(doings, joint)
     fixed: tuple[tuple[str, float], ...] = ()
@@ -125,9 +133,11 @@ def _harmonic(effect: str, doings: Doings, joint: int, order: float, choices: in
     elif effect == "mesh":
         fixed = (("order_1", order),)
     atom = f"{order:.4g} times a turn" if of == "rad" else f"every {2e3 * np.pi / order:.4g} mm"
-    return Candidate(
-        Place(effect, joint=joint + 1), atom, (f"sine_{of}", f"cosine_{of}"), columns, choices, (ANGLE, ANGLE), fixed
-    )
+    if doubled:
+        atom += ", with its double"
+    names = tuple(f"{wave}{OF_TIMES[k]}_{of}" for k in times for wave in ("sine", "cosine"))
+    reference = tuple(ANGLE / k**2 for k in times for _ in range(2))
+    return Candidate(Place(effect, joint=joint + 1), atom, names, columns, choices, reference, fixed)
 
 
 def _spindle_orders(doings: Doings, joint: int) -> list[float]:

@@ -15,6 +15,8 @@ LINK_AXES = (0, 1, 3, 4, 5)
 """A turn about z is the zero offset of the joint."""
 Law = Callable[[Doings], Array]
 """A rise of temperature at every point, K, or how warm something is, 0..1, (m,)."""
+THIRD = 0.3
+"""How much less an axis wobbles three times a turn."""
 WARM_UP_SHARES = (0.1, 0.3, 1.0)
 """Time constants of warming up, as shares of the whole time."""
 
@@ -33,10 +35,11 @@ def geometry_slots(doings: Doings) -> list[Slot]:
 
 
 def wobbles(doings: Doings) -> list[Candidate]:
-    """The axis tilts or shifts once and twice a turn as the joint turns; a guide is not straight along its way."""
+    """The axis tilts or shifts up to three times a turn as the joint turns; a guide is not straight along its way."""
     out = []
     for j in motors(doings):
-        tilts, shifts = (0, 1, 2) if doings.seen.chain.sliding[j] else (0, 1), (3, 4, 5)
+        # What lies along a guide is the drive's, what turns about an axis as well.
+        tilts, shifts = ((0, 1, 2), (3, 4)) if doings.seen.chain.sliding[j] else ((0, 1), (3, 4, 5))
         ways = ((tilts, "tilts"), (shifts, "shifts"), ((*tilts, *shifts), "tilts and shifts"))
         out += [_wobble(doings, j, axes, atom) for axes, atom in ways]
     return out
@@ -63,25 +66,25 @@ def _geometry(link: int) -> Candidate:
 
 
 def _wobble(doings: Doings, joint: int, axes: tuple[int, ...], atom: str) -> Candidate:
-    orders, turn = (1, 2), ("", "_of_twice", "_of_three_times")
-    per_unit, middle = 1.0, 0.0
+    orders, per_unit, middle = {1: "", 2: "_of_twice", 3: "_of_three_times"}, 1.0, 0.0
     if doings.seen.chain.sliding[joint]:
         # Half waves of what was travelled are smooth functions with any ends.
         x = doings.active[:, joint]
-        orders, per_unit, middle = (1, 2, 3), np.pi / float(np.ptp(x)), float(x.min() + x.max()) / 2
+        per_unit, middle = np.pi / float(np.ptp(x)), float(x.min() + x.max()) / 2
 
     def columns(doings: Doings) -> list[Column]:
         x = per_unit * (doings.active[:, joint] - middle)
         waves = [wave(order * x) for order in orders for wave in (np.sin, np.cos)]
         return [[(Slot(Part.AXIS, joint, k), wave)] for k in axes for wave in waves]
 
-    waves = [f"{wave}{turn[order - 1]}" for order in orders for wave in ("sine", "cosine")]
+    waves = [f"{wave}{times}" for times in orders.values() for wave in ("sine", "cosine")]
     names = tuple(
         f"{'tilt_about' if k < 3 else 'shift_along'}_{'xyz'[k % 3]}_{wave}_{'rad' if k < 3 else 'm'}"
         for k in axes
         for wave in waves
     )
-    reference = tuple(ANGLE if k < 3 else LENGTH for k in axes for _ in waves)
+    share = [1.0 if order < 3 else THIRD for order in orders for _ in range(2)]
+    reference = tuple((ANGLE if k < 3 else LENGTH) * part for k in axes for part in share)
     return Candidate(Place("axis_wobble", joint=joint + 1), atom, names, columns, 3, reference)
 
 

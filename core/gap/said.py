@@ -1,0 +1,190 @@
+"""What is said of the gap: names in their order, and what has no name before or after them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from core.gap.analysis import Analysis
+from core.gap.evidence import Chosen, joined, without
+from core.gap.open_set import AT_FLOOR, EVERYWHERE, Judge, Stand, stands, unknown_at
+from core.gap.posterior import sufficient
+from core.gap.result import UNKNOWN, Place
+
+TOLD_SHARE = 0.01
+"""Of the gap: a change of geometry that closes less, or a name that adds less to something unknown, is not told."""
+SURE_OF_REST = 0.1
+"""What nameless functions must still close, as a share of the gap, to be told as something unknown."""
+MANY, MANY_LEAVE = 3, 4.0
+"""Names that together leave too much: none of their joints is where something acts. More of them than that must leave
+less than so many floors (mean squares), or they only imitate something else."""
+ONE_JOINT = 0.8
+"""Of the evidence for functions of the whole configuration: where one joint's have as much, it is that joint."""
+FAINT = 1.3
+"""Times the noise (mean squares) of what does not stand out of it by itself."""
+
+
+def told_stands(analysis: Analysis) -> list[Stand]:
+    """All causes that were told to be there, the one that the data say most for first."""
+    everything = analysis.everything
+    causes = [
+        Stand(analysis.problem.candidates[g].place, (g,), (s,), 1.0)
+        for g, s in zip(everything.groups, everything.sizes, strict=True)
+    ]
+    return sorted(causes, key=lambda one: evidence_lost(analysis, one, causes), reverse=True)
+
+
+def chosen_of(some: Sequence[Stand]) -> Chosen:
+    """All candidates that describe several causes."""
+    return joined(*(Chosen(one.groups, one.sizes) for one in some))
+
+
+def evidence_lost(analysis: Analysis, stand: Stand, named: Sequence[Stand]) -> float:
+    """What the data say for one cause when all others are given: geometry can move much that placing takes back."""
+    evidence, everything = analysis.evidence, joined(chosen_of(named), analysis.given)
+    return evidence.given(everything) - evidence.given(without(everything, stand.groups))
+
+
+@dataclass(frozen=True, eq=False)
+class Said:
+    """What a search found and a judge let stand, ordered and located."""
+
+    analysis: Analysis
+    judge: Judge
+
+    def stands(self) -> list[Stand]:
+        """Named causes, the one that the data say most for first, and unknown ones, each place once."""
+        out: list[Stand] = []
+        for one in self._ordered():
+            sharp = replace(one, place=self._sharper(one.place)) if one.unknown else one
+            if not any(sharp.unknown and other.place.same_as(sharp.place) for other in out):
+                out.append(sharp)
+        return out
+
+    def _sharper(self, place: Place) -> Place:
+        """A joint instead of the whole configuration, where an error of that joint alone says nearly as much."""
+        if place.variable != "configuration":
+            return place
+        evidence = {variable: self.analysis.evidence.given(chosen) for variable, chosen in self.judge.local.items()}
+        of_joints = {variable: value for variable, value in evidence.items() if variable.startswith("joint")}
+        best = max(of_joints, key=of_joints.__getitem__, default=None)
+        if best is None or of_joints[best] < ONE_JOINT * evidence.get("configuration", 0.0):
+            return place
+        return unknown_at(best)
+
+    def _ordered(self) -> list[Stand]:
+        judged = [*self._geometry_stands(), *stands(self.judge)]
+        named = [one for one in judged if not one.unknown]
+        order = sorted(named, key=lambda one: evidence_lost(self.analysis, one, named), reverse=True)
+        order = [one for one in order if self._matters(one, order)]
+        if self._faint(order):
+            order = []
+        unknown = self._unknown([one for one in judged if one.unknown], order)
+        one = None if self.analysis.given.groups else self._one_for_all(order)
+        if one is not None:
+            rest = [other for other in unknown if not other.place.same_as(one.place)]
+            return [one, *self._adding(order, [one, *rest]), *rest]
+        if order and not self.analysis.given.groups and not self._enough(order):
+            return [*self._stood_in_for(order, unknown), *(self._adding(order, unknown) if unknown else order)]
+        return self._strongest_first(order, unknown)
+
+    def _faint(self, named: list[Stand]) -> bool:
+        """Whether names close little of what hardly stands out of the noise."""
+        closed = self.judge.base_m2 - self.judge.square(chosen_of(named))
+        return self.judge.base_m2 < FAINT * self.judge.floor_m2 and closed < 0.5 * self.judge.closable_m2
+
+    def _enough(self, named: list[Stand]) -> bool:
+        """Whether names close what can be closed; many together may do so for anything, but not down to the noise."""
+        chosen = chosen_of(named)
+        left = self.judge.open.square_m2(joined(chosen, self.judge.found))
+        if len(named) > MANY and left > MANY_LEAVE * self.judge.floor_m2:
+            return False
+        return sufficient(self.judge, chosen) >= 0.5
+
+    def _one_for_all(self, named: list[Stand]) -> Stand | None:
+        """One thing without a name that leaves less of kept-out points than names at several places; None: none."""
+        judge = self.judge
+        if len({judge.variable(one.place) for one in named}) < 2 or not judge.local:
+            return None
+        if judge.open.square_m2(joined(chosen_of(named), judge.found)) < AT_FLOOR * judge.floor_m2:
+            return None
+        left = {variable: judge.open.square_m2(chosen) for variable, chosen in judge.local.items()}
+        best = min(left, key=left.__getitem__)
+        if judge.open.square_m2(chosen_of(named)) < left[best]:
+            return None
+        return Stand(unknown_at(best), judge.local[best].groups, judge.local[best].sizes, 0.0)
+
+    def _stood_in_for(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
+        """What names that leave too much most probably stand in for: something at their joint, or everywhere."""
+        lost = self._lost_m2([*named, *unknown])[len(named) :]
+        unknown = [unknown[k] for k in np.argsort(lost)[::-1]]
+        if unknown and len(named) < MANY:
+            return unknown
+        place = self._foremost(named)
+        same = [one for one in unknown if one.place.same_as(place)] or [Stand(place, (), (), 0.0)]
+        return [*same, *(one for one in unknown if not one.place.same_as(place))]
+
+    def _foremost(self, named: list[Stand]) -> Place:
+        """Where names stand in for something: their common variable, or that of the best functions without a name."""
+        variables = {self.judge.variable(one.place) for one in named}
+        if len(variables) == 1:
+            return unknown_at(variables.pop())
+        best = [self.judge.problem.candidates[g].place for g in self.judge.lone.groups[:1]]
+        return replace(best[0], effect=UNKNOWN) if best else unknown_at("configuration")
+
+    def _strongest_first(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
+        """Names in their order; before them what has no name and closes more than any: names must add to it then."""
+        lost = self._lost_m2([*named, *unknown])
+        most = max(lost[: len(named)], default=np.inf) + SURE_OF_REST * self.judge.closable_m2
+        first = [one for one, m2 in zip(unknown, lost[len(named) :], strict=True) if m2 > most]
+        told = self._adding(named, unknown) if first else named
+        return [*first, *told, *(one for one in unknown if one not in first)]
+
+    def _adding(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
+        """Names that add to what has none."""
+        least = TOLD_SHARE * self.judge.closable_m2
+        lost = self._lost_m2([*named, *unknown])
+        return [one for one, m2 in zip(named, lost, strict=False) if m2 > least or self._is_given(one)]
+
+    def _lost_m2(self, told: list[Stand]) -> list[float]:
+        """What each of several closes when all others are given, m^2."""
+        whole = self.judge.square(chosen_of(told))
+        return [self.judge.square(chosen_of([o for o in told if o is not one])) - whole for one in told]
+
+    def _is_given(self, stand: Stand) -> bool:
+        return bool(stand.groups) and stand.groups[0] in self.analysis.given.groups
+
+    def _matters(self, stand: Stand, others: list[Stand]) -> bool:
+        """Whether geometry that is fitted anyway is worth telling of."""
+        if not self._is_given(stand):
+            return True
+        a = self.analysis
+        known = without(joined(a.given, self.judge.worth), stand.groups)
+        if not a.evidence.gains(np.array(stand.groups), known).evidence[0] > 0:
+            return False
+        rest = chosen_of([one for one in others if one is not stand])
+        kept, closable = self.judge.kept_out, self.judge.closable_m2
+        return kept.square_m2(rest) - kept.square_m2(joined(rest, chosen_of([stand]))) > TOLD_SHARE * closable
+
+    def _geometry_stands(self) -> list[Stand]:
+        given = self.analysis.given
+        candidates = self.analysis.problem.candidates
+        return [Stand(candidates[g].place, (g,), (s,), 1.0) for g, s in zip(given.groups, given.sizes, strict=True)]
+
+    def _unknown(self, located: list[Stand], named: list[Stand]) -> list[Stand]:
+        """What acts without a name: at places where names failed, and where all names leave something."""
+        judge, out = self.judge, list(located)
+        so_far = chosen_of([*named, *located])
+        left = judge.square(so_far)
+        rest = judge.rest if named or located else judge.lone
+        if rest.groups and left - judge.square(joined(so_far, rest)) > SURE_OF_REST * judge.closable_m2:
+            place = judge.problem.candidates[rest.groups[0]].place
+            unknown = Place(UNKNOWN, joint=place.joint, variable=place.variable)
+            if not any(one.place.same_as(unknown) for one in out):
+                out.append(Stand(unknown, rest.groups, rest.sizes, 0.0))
+        noise = self.analysis.noise
+        known = [one.place for one in (*out, *named)]
+        told = noise.scattering in {one.joint for one in known} or any(one.effect in EVERYWHERE for one in known)
+        if noise.scattering is not None and not told and (noise.excess > 1 or noise.unlike_statement):
+            out.append(Stand(Place(UNKNOWN, joint=noise.scattering), (), (), 0.0))
+        return out
