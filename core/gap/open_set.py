@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
+from core.gap.effects import drives
 from core.gap.effects.candidate import Candidate
 from core.gap.evidence import NOTHING, Chosen, Evidence, joined, without
 from core.gap.kept_out import KeptOut
@@ -23,6 +24,8 @@ RIPPLE = 6.0
 EXACT, EXACTLY = frozenset({"zero_offset", "ratio", "eccentricity", "mesh"}), 0.96
 """Smooth effects whose forms are exact must close nearly all, down to the noise with all else that was found: whatever
 is smooth looks like them otherwise."""
+FEWEST_TEETH = 3.0
+"""Times a turn."""
 LOCALLY = 0.92
 """Share of what nameless functions close that a name must close to stand."""
 MOSTLY = 0.85
@@ -247,10 +250,10 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Cho
         first = spot.order[0]
         if small.groups and not _smooth(spot.candidate(first)):
             named = _names(replace(spot, elsewhere=joined(elsewhere, small)))
-        if not named and spot.share([first]) >= MOSTLY:
-            beside = without(here, [here.groups[k] for k in spot.forms(first)])
-            alone = replace(spot, here=_pick(here, spot.forms(first)), elsewhere=joined(elsewhere, small, beside))
-            named = _names(alone)
+        beside = joined(small, without(here, [here.groups[k] for k in spot.forms(first)]))
+        imitate = any(_smooth(judge.problem.candidates[g]) for g in beside.groups)
+        if not named and spot.share([first]) >= MOSTLY and not imitate:
+            named = _names(replace(spot, here=_pick(here, spot.forms(first)), elsewhere=joined(elsewhere, beside)))
     if named:
         return named
     groups = joined(local, here)
@@ -319,10 +322,10 @@ def _names(spot: Spot) -> list[Stand]:
     """The names that suffice at one variable: one, several forms of one, or two; none: nameless functions do better."""
     first = spot.order[0]
     forms = spot.forms(first)
-    if spot.candidate(first).place.effect in EXACT and _smooth(spot.candidate(first)):
-        enough = spot.share([first]) >= EXACTLY and spot.to_the_noise
-    else:
-        enough = spot.share([first]) >= LOCALLY
+    likely = spot.candidate(first)
+    exact = likely.place.effect in EXACT and _smooth(likely)
+    imitates = exact and (likely.place.effect != "mesh" or is_slow(likely))
+    enough = spot.share([first]) >= (EXACTLY if exact else LOCALLY) and (spot.to_the_noise or not imitates)
     if enough or (len(forms) > 1 and spot.share(forms) >= LOCALLY):
         share = spot.share([first] if enough else forms)
         second = _second(spot, forms)
@@ -360,6 +363,12 @@ def _differ(spot: Spot, first: int, second: int) -> bool:
     """Whether two names are of different effects."""
     one, other = (spot.candidate(k).place for k in (first, second))
     return (one.effect, one.source) != (other.effect, other.source)
+
+
+def is_slow(candidate: Candidate) -> bool:
+    """Whether a mesh has so few teeth that anything smooth looks like it."""
+    order = drives.order_of(candidate)
+    return candidate.place.effect == "mesh" and order is not None and order < FEWEST_TEETH
 
 
 def _smooth(candidate: Candidate) -> bool:

@@ -9,7 +9,7 @@ from scipy.special import expit
 
 from core.gap.effects.candidate import motors
 from core.gap.evidence import Chosen, joined, without
-from core.gap.open_set import AT_FLOOR, LOCALLY, Judge, Stand
+from core.gap.open_set import AT_FLOOR, LOCALLY, Judge, Stand, is_slow
 from core.gap.result import Place
 from core.geometry import Array
 
@@ -26,8 +26,9 @@ LEAST, MOST = 0.1, 0.97
 """However badly or well names close, so often they are right in those worlds."""
 BESIDE_UNKNOWN = 0.4
 """How much less a name is worth that is told after something without a name."""
-ONE_MOVES = 0.5
-"""Where one joint alone moves, everything is some function of it: no name is likelier than not."""
+AT_BEST, LIKE_LOST_MOTION = 0.5, frozenset({"mesh", "quantisation"})
+"""Where one joint alone moves, everything is some function of it; where nobody wrote down how points were reached, lost
+motion looks like ripple; anything smooth looks like a mesh of few teeth: no such name is likelier than not."""
 TWIN_ODDS = 0.05
 """A candidate at least so probable beside the named one is its twin."""
 
@@ -118,7 +119,11 @@ def sufficient(judge: Judge, named: Chosen) -> float:
 
 def has_name(judge: Judge, stand: Stand) -> float:
     """Probability that some name of the library is right, from how much nameless functions would still add."""
-    most = ONE_MOVES if len(motors(judge.problem.doings)) < 2 else 1.0
+    told, most = judge.problem.doings, 1.0
+    slow = is_slow(judge.problem.candidates[stand.groups[0]])
+    unlogged = stand.place.effect in LIKE_LOST_MOTION and not told.past.complete
+    if len(motors(told)) < 2 or unlogged or slow:
+        most = AT_BEST
     return most * float(expit((stand.local - NAMED_AT) / NAMED_WIDTH))
 
 

@@ -57,5 +57,10 @@ def unit(doings: Doings, joint: int) -> str:
 
 def motors(doings: Doings) -> list[int]:
     """Joints with a motor that moves at all, from 0."""
-    moving = (doings.seen.span > 1e-6) & doings.seen.chain.commanded
-    return [int(j) for j in np.flatnonzero(moving & (doings.seen.link.max() > np.arange(doings.seen.joint_count)))]
+    return [j for j in driven(doings) if doings.seen.span[j] > 1e-6]
+
+
+def driven(doings: Doings) -> list[int]:
+    """Joints with a motor, held ones too, from 0."""
+    before = doings.seen.link.max() > np.arange(doings.seen.joint_count)
+    return [int(j) for j in np.flatnonzero(doings.seen.chain.commanded & before)]

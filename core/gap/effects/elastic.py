@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from core.gap.doings import Doings
-from core.gap.effects.candidate import ANGLE, Candidate, Column, drive, motors, unit
+from core.gap.effects.candidate import ANGLE, Candidate, Column, drive, driven, unit
 from core.gap.result import Place
 from core.gap.sim import Part, Slot
 from core.geometry import Array
@@ -30,7 +30,7 @@ def compliances(doings: Doings) -> list[Candidate]:
     """g = q + load / stiffness, the load from gravity and payload, or as the robot reports it."""
     out = []
     if doings.drive_load is not None:
-        for j in motors(doings):
+        for j in driven(doings):
             if _loaded(doings.drive_load, j):
                 out.append(_compliance(doings, j, "torque from weights", _from_weights(j)))
             if _loaded(doings.drive_load, j) or _loaded_off_centre(doings, j):
@@ -38,7 +38,7 @@ def compliances(doings: Doings) -> list[Candidate]:
     torque = doings.logged("torque_nm")
     if torque is not None:
         out += [
-            _compliance(doings, j, "torque as reported", _reported(j)) for j in motors(doings) if _loaded(torque, j)
+            _compliance(doings, j, "torque as reported", _reported(j)) for j in driven(doings) if _loaded(torque, j)
         ]
     return out
 
@@ -72,7 +72,7 @@ def payloads(doings: Doings) -> list[Candidate]:
         if logged and np.ptp(doings.seen.payload_kg) == 0:
             continue
         acting = per_kg * doings.seen.payload_kg[:, None] if logged else per_kg
-        heaviest = {j: float(np.abs(per_kg[:, j]).max()) for j in motors(doings) if _loaded(acting, j)}
+        heaviest = {j: float(np.abs(per_kg[:, j]).max()) for j in driven(doings) if _loaded(acting, j)}
         if heaviest:
             out += [_payload(doings, heaviest, logged, centre) for centre in (False, True)]
     return out
