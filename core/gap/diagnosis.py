@@ -21,7 +21,7 @@ from core.gap.kept_out import KeptOut, mean_square
 from core.gap.observations import Observations, observe
 from core.gap.open_set import AT_FLOOR, Judge, Stand
 from core.gap.placement import placement_slots
-from core.gap.posterior import BESIDE_UNKNOWN, adequate, rivals, twins
+from core.gap.posterior import AT_BEST, BESIDE_UNKNOWN, adequate, floats, rivals, twins
 from core.gap.problem import Problem
 from core.gap.reliability import reliability
 from core.gap.result import (
@@ -368,6 +368,8 @@ def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, 
         return _significance(found, stand), (stand.place,)
     probability, alike = twins(found.judge, stand, rivals(found.judge, stand, others))
     beside = BESIDE_UNKNOWN if found.stands[0].unknown else 1.0
+    if floats(found.judge, stand, found.named):
+        beside = min(beside, AT_BEST)
     return beside * probability * adequate(found.judge, chosen_of(found.named), chosen_of(found.stands)), alike
 
 

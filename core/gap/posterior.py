@@ -4,6 +4,8 @@ Evidence is worth what the forms of the effects are worth. A form that is off by
 changes the evidence by that share, so differences below it decide nothing.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.special import expit
 
@@ -115,6 +117,14 @@ def sufficient(judge: Judge, named: Chosen) -> float:
         left = min(left, with_small)
     closed = (judge.square(Chosen()) - left) / judge.closable_m2
     return float(expit((closed - CLOSES_AT) / CLOSES_WIDTH))
+
+
+def floats(judge: Judge, stand: Stand, named: Sequence[Stand]) -> bool:
+    """Whether a joint seems to give and to lose motion, and more is left: so does play that weights hold on a flank."""
+    here = {one.place.effect for one in named if one.place.joint == stand.place.joint}
+    both = stand.place.effect in LOST_MOTION | {"compliance"} and "compliance" in here and bool(LOST_MOTION & here)
+    everything = joined(*(Chosen(one.groups, one.sizes) for one in named))
+    return both and judge.square(everything) > AT_FLOOR * judge.floor_m2
 
 
 def has_name(judge: Judge, stand: Stand) -> float:
