@@ -33,9 +33,9 @@ DRAWN_PRIORS = (UNCALIBRATED, 3e-3, 1e-2)
 """How far an arm as built may be from its drawing, rad and m; the data choose."""
 STRAY = 2.5
 """Calibrated sizes rms by which geometry must stray before a sim is suspected to be as drawn."""
-FAR_LEFT, GEOMETRY_CLOSES = 16.0, 0.6
-"""That is said where causes alone leave so many times the floor, and geometry with causes at most such a part of it
-(mean squares)."""
+FAR_LEFT, GEOMETRY_CLOSES, GEOMETRY_STAYS = 2.0, 0.6, 0.9
+"""That is said where causes alone leave so many times the floor, and geometry with causes at most such a part of what
+they leave beyond it (mean squares); and stays so in later passes."""
 NULL_QUANTILE, NULL_MARGIN = 0.9, 3.0
 """Of the largest evidence that noise alone makes; beyond a quantile it falls off as exp(-x)."""
 MOST_FLEXIBLE, MOST_SPENT = 4, 0.08
@@ -95,6 +95,8 @@ class NoiseFound:
         covariance = _rescaled(stated, used / before)
         scaled = whitening(covariance, np.ones(seen.count)).rows(left_m)
         weight = _fitted(seen).astype(float)
+        # What a fit misses everywhere makes no outliers.
+        scaled /= np.sqrt(max(noise_found.robust_variance(scaled[weight > 0]), 1.0))
         outlying = np.flatnonzero((weight > 0) & (np.abs(scaled).max(axis=1) > noise_found.OUTLYING))
         weight[outlying] = 0.0
         inlying = weight > 0
@@ -155,12 +157,13 @@ def analyse(
         library = [one for one in library if not one.named or told(one)]
     progress(0.1, "estimating the noise")
     first = noise = _first_noise(told_doings, residual_m, covariance, base_weight)
-    aim = residual_m
+    aim, drawn = residual_m, False
     for turn in range(PASSES):
         progress((turn + 0.5) / (PASSES + 1), "searching for causes")
         white = whitening(noise.covariance_m2, noise.weight, noise.memory)
         problem = pose_problem(sim, told_doings, library, aim, white)
-        best = _best_prior(problem, float(noise.floor_m2.mean()))
+        best = _best_prior(problem, float(noise.floor_m2.mean()), GEOMETRY_STAYS if drawn else GEOMETRY_CLOSES)
+        drawn = bool(best[-1].groups)
         learnt = _learn(told_doings, problem, best, first, told, steps=turn == 0)
         fresh = [one for one in learnt.sharper if one.place.effect not in without]
         straight = learnt.bent_m2 < BENT**2 * noise.floor_m2.mean()
@@ -246,8 +249,12 @@ def _rescaled(covariance: Array, variance: float) -> Array:
     return covariance + extra * np.eye(3)
 
 
-def _best_prior(problem: Problem, floor_m2: float) -> tuple[Evidence, float, float, Found, Chosen]:
-    """The geometry prior under which everything together is most probable, and what is found with it."""
+def _best_prior(problem: Problem, floor_m2: float, closes: float) -> tuple[Evidence, float, float, Found, Chosen]:
+    """The geometry prior under which everything together is most probable, and what is found with it.
+
+    Args:
+        closes: part of what causes alone leave beyond the floor that geometry with causes may leave, to be drawn.
+    """
     tried = [_with_prior(problem, prior) for prior in GEOMETRY_PRIORS]
     _, *best = max(tried, key=lambda one: one[0])
     calibrated = (*best, Chosen())
@@ -258,7 +265,8 @@ def _best_prior(problem: Problem, floor_m2: float) -> tuple[Evidence, float, flo
         return calibrated
     # As drawn: data enough overcome any prior, and what is fitted along must not hide what is off.
     drawn = _as_drawn(problem)
-    return drawn if _kept_out_m2(problem, drawn, AS_CALIBRATED) < GEOMETRY_CLOSES * left else calibrated
+    beyond = _kept_out_m2(problem, drawn, AS_CALIBRATED) - floor_m2
+    return drawn if beyond < closes * (left - floor_m2) else calibrated
 
 
 def _with_prior(problem: Problem, prior: float) -> tuple[float, Evidence, float, float, Found]:

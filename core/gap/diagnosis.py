@@ -196,8 +196,10 @@ class Findings:
 
     @cached_property
     def honest(self) -> KeptOut:
-        """All named causes, with geometry found anew by every fit: how good the corrected sim is."""
-        return self._kept(self.chosen, None)
+        """All named causes, with geometry found anew by every fit or left alone: how good the corrected sim is."""
+        anew, alone = (self._kept(self.chosen, geometry) for geometry in (None, np.zeros(self.wide.problem.geometry)))
+        chosen = self.wide.chosen(self.chosen)
+        return anew if anew.square_m2(chosen) < alone.square_m2(chosen) else alone
 
     def _kept(self, chosen: Chosen, geometry: Array | None) -> KeptOut:
         groups = self.wide.chosen(joined(self.chosen, chosen)).groups

@@ -141,10 +141,20 @@ class Said:
         return [*first, *told, *(one for one in unknown if one not in first)]
 
     def _adding(self, named: list[Stand], unknown: list[Stand]) -> list[Stand]:
-        """Names that add to what has none."""
+        """Names that add to what has none, and without it predict better than no name."""
         least = TOLD_SHARE * self.judge.closable_m2
         lost = self._lost_m2([*named, *unknown])
-        return [one for one, m2 in zip(named, lost, strict=False) if m2 > least or self._is_given(one)]
+        out = [one for one, m2 in zip(named, lost, strict=False) if m2 > least or self._is_given(one)]
+        while out:
+            without_m2 = [self._open_m2([other for other in out if other is not one]) for one in out]
+            worst = int(np.argmin(without_m2))
+            if without_m2[worst] > self._open_m2(out) or self._is_given(out[worst]):
+                break
+            out = out[:worst] + out[worst + 1 :]
+        return out
+
+    def _open_m2(self, some: list[Stand]) -> float:
+        return self.judge.open.square_m2(joined(self.analysis.given, chosen_of(some)))
 
     def _lost_m2(self, told: list[Stand]) -> list[float]:
         """What each of several closes when all others are given, m^2."""

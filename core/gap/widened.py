@@ -41,12 +41,14 @@ def thinned(seen: Observations) -> Observations:
 
 
 def widened(analysis: Analysis, seen: Observations, groups: Sequence[int], state: Chosen) -> Wide:
-    """All points with some candidates of a search.
+    """All points with some candidates of a search; few points again where what the search was bent about is dropped.
 
     Args:
         state: what sets the state about which the model is linear.
     """
-    if seen is analysis.sim.seen:
+    strongest = analysis.found.chosen.groups[:1]
+    straight = analysis.sim is analysis.placed or set(strongest) <= set(state.groups)
+    if seen is analysis.sim.seen and straight:
         same = {g: g for g in range(len(analysis.problem.candidates))}
         return Wide(analysis.problem, same, analysis.noise, analysis.residual_m)
     told = doings(seen)
