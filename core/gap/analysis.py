@@ -255,9 +255,7 @@ def _best_prior(problem: Problem, floor_m2: float, closes: float) -> tuple[Evide
     Args:
         closes: part of what causes alone leave beyond the floor that geometry with causes may leave, to be drawn.
     """
-    tried = [_with_prior(problem, prior) for prior in GEOMETRY_PRIORS]
-    _, *best = max(tried, key=lambda one: one[0])
-    calibrated = (*best, Chosen())
+    calibrated = _as_calibrated(problem)
     if not _geometry_strays(problem):
         return calibrated
     left = _kept_out_m2(problem, calibrated, KNOWN)
@@ -269,11 +267,17 @@ def _best_prior(problem: Problem, floor_m2: float, closes: float) -> tuple[Evide
     return drawn if beyond < closes * (left - floor_m2) else calibrated
 
 
-def _with_prior(problem: Problem, prior: float) -> tuple[float, Evidence, float, float, Found]:
-    evidence = problem.evidence(prior)
-    threshold = null_threshold(problem, evidence)
-    found = search(evidence, problem.named, problem.cost, threshold)
-    return found.log_evidence + evidence.nuisance_evidence, evidence, prior, threshold, found
+def _as_calibrated(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
+    """The search under the prior by which what it finds is most probable."""
+    priors = {prior: problem.evidence(prior) for prior in GEOMETRY_PRIORS}
+    # The tightest first: a looser one may take up what has a name.
+    first = GEOMETRY_PRIORS[0]
+    threshold = null_threshold(problem, priors[first])
+    found = search(priors[first], problem.named, problem.cost, threshold)
+    best = max(priors, key=lambda prior: priors[prior].given(found.chosen) + priors[prior].nuisance_evidence)
+    if best != first:
+        found = search(priors[best], problem.named, problem.cost, threshold)
+    return priors[best], best, threshold, found, Chosen()
 
 
 def _geometry_strays(problem: Problem) -> bool:
@@ -304,11 +308,13 @@ def _as_drawn(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
     evidence = problem.evidence(AS_CALIBRATED)
     threshold = null_threshold(problem, evidence)
     # The sim's geometry is generally off: every frame and zero offset is a cause from the start.
-    tried = [
-        (search(evidence, problem.named, problem.cost, threshold, given), given)
-        for given in (drawn_geometry(problem, size) for size in DRAWN_PRIORS)
-    ]
-    found, given = max(tried, key=lambda one: one[0].log_evidence)
+    sizes = {size: drawn_geometry(problem, size) for size in DRAWN_PRIORS}
+    first = DRAWN_PRIORS[len(DRAWN_PRIORS) // 2]
+    found = search(evidence, problem.named, problem.cost, threshold, sizes[first])
+    best = max(sizes, key=lambda size: evidence.given(joined(sizes[size], found.chosen)))
+    if best != first:
+        found = search(evidence, problem.named, problem.cost, threshold, sizes[best])
+    given = sizes[best]
     return evidence, AS_CALIBRATED, threshold, found, given
 
 
@@ -346,7 +352,9 @@ def _learn(
     better = sharpened(problem.sim, told, chosen, named_left, own, scale)
     noise = _undoubted(noise, first, told.seen, chosen, better)
     if steps or noise.excess > 1:
-        aims = [named_left] if not found.chosen.groups else [named_left, _left(problem, evidence, prior, given)[0]]
+        aims = [named_left]
+        if steps and found.chosen.groups:
+            aims.append(_left(problem, evidence, prior, given)[0])
         better += encoder_steps(problem.sim, told, aims, scale)
     if only is not None:
         better = [one for one in better if only(one)]

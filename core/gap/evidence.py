@@ -81,7 +81,9 @@ class Evidence:
             factor, np.column_stack([self.sums.square[:n], self.sums.pull[:n], self.sums.null_pulls[:n]])
         )
         p = self.sums.square.shape[0]
-        square = self.sums.square - self.sums.square[:, :n] @ solved[:, :p]
+        # In place: the squares are by far the largest thing in memory.
+        square = self.sums.square[:, :n] @ solved[:, :p]
+        np.subtract(self.sums.square, square, out=square)
         pull = self.sums.pull - self.sums.square[:, :n] @ solved[:, p]
         nulls = self.sums.null_pulls - self.sums.square[:, :n] @ solved[:, p + 1 :]
         explained = self.sums.pull[:n] @ solved[:, p]

@@ -1,7 +1,7 @@
 """One campaign's residuals with all candidates' columns, ready to be searched."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -85,6 +85,9 @@ def pose_problem(
     design = Design(sim, (*nuisance, *columns), scale)
     sums = gram(design, residual_m, white, NULL_DRAWS, NULL_SEED)
     unit = _units(sums, slices, start)
+    # In place: nobody else holds these sums, and they are large.
+    for part, by in ((sums.square, unit), (sums.square.T, unit), (sums.pull, unit), (sums.null_pulls.T, unit)):
+        part *= by
     return Problem(
         sim,
         doings,
@@ -96,12 +99,7 @@ def pose_problem(
         placement_priors(sim.seen, placement),
         residual_m,
         white,
-        replace(
-            sums,
-            square=sums.square * unit[:, None] * unit,
-            pull=sums.pull * unit,
-            null_pulls=sums.null_pulls * unit[:, None],
-        ),
+        sums,
     )
 
 
