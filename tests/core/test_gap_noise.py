@@ -5,8 +5,10 @@ from functools import cache
 import numpy as np
 import pytest
 from gap_arms import ARMS, Day, day
+from gap_cells import SIGMA_M, crane_cell, measured
 from numpy.random import Generator
 
+from core.gap.analysis import analyse
 from core.gap.doings import Doings, doings
 from core.gap.noise_found import (
     HEAVY,
@@ -18,6 +20,7 @@ from core.gap.noise_found import (
     student_weights,
     tail_degrees,
 )
+from core.gap.observations import observe
 from core.geometry import Array
 
 
@@ -186,3 +189,14 @@ def test_outliers_are_far_beyond_what_normal_noise_does() -> None:
     rng = np.random.default_rng(3)
     worst = np.abs(rng.normal(size=(20_000, 3))).max()
     assert worst < OUTLYING
+
+
+def test_what_a_fit_misses_everywhere_makes_no_outliers() -> None:
+    """Over points that were not searched: three hundred times the noise at all of them, ten times that at one."""
+    analysis = analyse(observe(measured(crane_cell())))
+    seen = analysis.sim.seen
+    left_m = np.random.default_rng(3).normal(0.0, 300 * SIGMA_M, (seen.count, 3))
+    left_m[17] = 3000 * SIGMA_M
+    noise = analysis.noise.over(seen, left_m)
+    assert noise.outliers.tolist() == [17]
+    assert np.count_nonzero(noise.weight) == seen.count - 1

@@ -1,0 +1,77 @@
+"""What no name describes is told as unknown, where it is; and names are not doubted for what is true beside them."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_cells import crane_cell, measured
+
+from core.gap.analysis import analyse
+from core.gap.diagnosis import Findings, diagnose
+from core.gap.evidence import NOTHING, Chosen
+from core.gap.folds import blocks
+from core.gap.observations import observe
+from core.gap.placement import place
+from core.gap.posterior import rivals
+from core.gap.result import UNKNOWN, Place
+from core.gap.sim import Part, Sim, Slot
+from core.geometry import Array
+from core.measurements import Campaign
+
+Field = Callable[[Sim], Array]
+
+
+def bent(campaign: Campaign, shift_m: Field) -> Campaign:
+    """A campaign whose points lie elsewhere by shifts (m, 3)."""
+    seen = observe(campaign)
+    sim = place(seen, np.ones(seen.count))
+    points = campaign.measurements.point_m.copy()
+    points[seen.rows] += shift_m(sim)
+    return replace(campaign, measurements=replace(campaign.measurements, point_m=points))
+
+
+def refraction(sim: Sim) -> Array:
+    """Points sink with the square of their height."""
+    height = sim.points_m()[:, 2] - sim.middle_m[2]
+    return -2e-3 * (height**2)[:, None] * np.array([0.3, -0.2, 1.0])
+
+
+def hose(sim: Sim) -> Array:
+    """Joint 2 gives way by where joint 1 stands as well."""
+    first, second = (sim.seen.active[:, j] / sim.seen.span[j] for j in (0, 1))
+    angle = 1.5e-3 * np.sin(5.0 * first + 0.4) * np.cos(4.0 * second)
+    return sim.moved_m({Slot(Part.DRIVE, 1): angle}) - sim.points_m()
+
+
+@pytest.mark.parametrize(
+    ("field", "place_"),
+    [(refraction, Place(UNKNOWN, variable="configuration")), (hose, Place(UNKNOWN, joint=2))],
+    ids=["bent room", "joint by another"],
+)
+def test_what_has_no_name_is_located(field: Field, place_: Place) -> None:
+    found = diagnose(bent(measured(crane_cell()), field))
+    assert found.causes[0].place.same_as(place_)
+    assert not any(cause.probability > 0.5 for cause in found.causes if cause.place.effect != UNKNOWN)
+
+
+def test_what_is_true_beside_a_cause_does_not_speak_against_it() -> None:
+    """Of a mesh and a far smaller change of scale, neither given the other: the mesh explains more in its place."""
+    seen = observe(measured(crane_cell(), "scale:-:500ppm", "mesh:3:0.03deg"))
+    found = Findings(analyse(seen), seen, blocks(seen), told=False)
+    scale = next(stand for stand in found.named if stand.place.effect == "scale")
+    judge = replace(found.judge, found=Chosen(scale.groups, scale.sizes))
+    named = judge.problem.named
+    gains = judge.evidence.gains(named).evidence
+    mesh = [k for k, g in enumerate(named) if judge.problem.candidates[g].place.effect == "mesh"]
+    assert gains[mesh].max() > judge.evidence.gains(np.array(scale.groups)).evidence[0] + 100
+    said = {(place.effect, place.joint): p for place, p in rivals(judge, scale, NOTHING)}
+    assert said[("mesh", 3)] < 1e-6 < 0.1 < said[("scale", None)]
+
+
+def test_a_great_shift_between_two_moments_of_the_search_is_found_to_the_record() -> None:
+    """Beside a joint error as large, the first look takes it for a drift."""
+    found = diagnose(measured(crane_cell(), "base_shift:113:2mm", "eccentricity:2:0.2deg"))
+    shift = next(cause.place for cause in found.causes if cause.place.effect == "base_shift")
+    assert shift.record == pytest.approx(113, abs=3)
+    assert any(cause.place == Place("eccentricity", joint=2) for cause in found.causes)
