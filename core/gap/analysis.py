@@ -263,21 +263,31 @@ def _best_prior(problem: Problem, floor_m2: float, closes: float) -> tuple[Evide
         return calibrated
     # As drawn: data enough overcome any prior, and what is fitted along must not hide what is off.
     drawn = _as_drawn(problem)
+    if _total(drawn) < _total(calibrated):
+        return calibrated
     beyond = _kept_out_m2(problem, drawn, AS_CALIBRATED) - floor_m2
     return drawn if beyond < closes * (left - floor_m2) else calibrated
 
 
+def _total(found: tuple[Evidence, float, float, Found, Chosen]) -> float:
+    """Log evidence of everything together: placement, geometry, what is given and what was found."""
+    evidence, _, _, names, _ = found
+    return names.log_evidence + evidence.nuisance_evidence
+
+
 def _as_calibrated(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
-    """The search under the prior by which what it finds is most probable."""
-    priors = {prior: problem.evidence(prior) for prior in GEOMETRY_PRIORS}
-    # The tightest first: a looser one may take up what has a name.
-    first = GEOMETRY_PRIORS[0]
-    threshold = null_threshold(problem, priors[first])
-    found = search(priors[first], problem.named, problem.cost, threshold)
-    best = max(priors, key=lambda prior: priors[prior].given(found.chosen) + priors[prior].nuisance_evidence)
-    if best != first:
-        found = search(priors[best], problem.named, problem.cost, threshold)
-    return priors[best], best, threshold, found, Chosen()
+    """The prior under which everything together is most probable, and what is found with it."""
+    tight, loose = (problem.evidence(prior) for prior in GEOMETRY_PRIORS)
+    threshold = null_threshold(problem, tight)
+    found = search(tight, problem.named, problem.cost, threshold)
+    best = (tight, GEOMETRY_PRIORS[0], threshold, found, Chosen())
+    total = found.log_evidence + tight.nuisance_evidence
+    # A looser one may take up what has a name, and is looked at where it says more of what the tight one found.
+    if loose.given(found.chosen) + loose.nuisance_evidence > tight.given(found.chosen) + tight.nuisance_evidence:
+        again = search(loose, problem.named, problem.cost, threshold)
+        if again.log_evidence + loose.nuisance_evidence > total:
+            best = (loose, GEOMETRY_PRIORS[1], threshold, again, Chosen())
+    return best
 
 
 def _geometry_strays(problem: Problem) -> bool:
@@ -312,9 +322,11 @@ def _as_drawn(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
     first = DRAWN_PRIORS[len(DRAWN_PRIORS) // 2]
     found = search(evidence, problem.named, problem.cost, threshold, sizes[first])
     best = max(sizes, key=lambda size: evidence.given(joined(sizes[size], found.chosen)))
+    given = sizes[first]
     if best != first:
-        found = search(evidence, problem.named, problem.cost, threshold, sizes[best])
-    given = sizes[best]
+        again = search(evidence, problem.named, problem.cost, threshold, sizes[best])
+        if again.log_evidence > found.log_evidence:
+            found, given = again, sizes[best]
     return evidence, AS_CALIBRATED, threshold, found, given
 
 
