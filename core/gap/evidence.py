@@ -17,6 +17,8 @@ from core.geometry import Array
 
 SIZES = 10.0 ** np.linspace(-2.0, 3.0, 21)
 """Scales of a group, in units of one noise standard deviation rms over the coordinates."""
+LEAST_PRECISION = 1e-12
+"""Of a nuisance column beside its own square."""
 HYPER = 0.5 * np.log10(SIZES) ** 2
 
 
@@ -75,7 +77,9 @@ class Evidence:
     @cached_property
     def _eliminated(self) -> tuple[Array, Array, Array, float]:
         n = self.nuisance
-        inner = self.sums.square[:n, :n] + np.diag(self.precision)
+        own = self.sums.square[:n, :n]
+        # Base and targets may stand for each other: what no prior tells apart, rounding must not either.
+        inner = own + np.diag(np.maximum(self.precision, LEAST_PRECISION * np.diag(own)))
         factor = cho_factor(inner)
         solved = cho_solve(
             factor, np.column_stack([self.sums.square[:n], self.sums.pull[:n], self.sums.null_pulls[:n]])
