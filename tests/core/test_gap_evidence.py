@@ -11,6 +11,7 @@ from core.gap.analysis import null_threshold
 from core.gap.doings import doings
 from core.gap.effects.candidate import Candidate
 from core.gap.evidence import HYPER, SIZES, Chosen, Evidence, joined
+from core.gap.gram import Gram
 from core.gap.library import candidates
 from core.gap.problem import NULL_DRAWS, Problem, pose_problem
 from core.gap.result import Place
@@ -192,3 +193,18 @@ def test_a_group_that_moves_no_point_gains_nothing() -> None:
     assert len(empty)
     gains = problem.evidence(PRIOR).gains(empty)
     assert gains.evidence.max() <= 0
+
+
+def test_placement_that_stands_for_itself_is_eliminated_all_the_same() -> None:
+    """A column twice, so well measured that the prior is lost in rounding: other columns see it as one column."""
+    rng = np.random.default_rng(7)
+    x = rng.standard_normal((90, 5))
+    x[:, :3] *= 1e6
+    x[:, 1] = x[:, 0]
+    y = rng.standard_normal(90)
+    sums = Gram(x.T @ x, x.T @ y, float(y @ y), 90, np.zeros((5, 1)))
+    twice = Evidence(sums, 3, np.full(3, 1e-2), (slice(3, 5),))
+    once = np.linalg.lstsq(x[:, [0, 2]], x[:, 3:], rcond=None)[0]
+    left = x[:, 3:] - x[:, [0, 2]] @ once
+    np.testing.assert_allclose(twice.square[3:, 3:], left.T @ left, rtol=1e-5, atol=1e-4)
+    np.testing.assert_allclose(twice.pull[3:], left.T @ y, rtol=1e-4, atol=1e-4)
