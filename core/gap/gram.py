@@ -34,7 +34,6 @@ def gram(design: Design, residual_m: Array, white: Whitening, draws: int, seed: 
     """
     p, m = design.count, design.sim.seen.count
     square, pull, nulls, total = np.zeros((p, p)), np.zeros(p), np.zeros((p, draws)), 0.0
-    product = np.empty((p, p))
     rng = np.random.default_rng(seed)
     previous: Array | None = None
     for rows in design.chunks():
@@ -43,7 +42,7 @@ def gram(design: Design, residual_m: Array, white: Whitening, draws: int, seed: 
         before = residual_m[rows.start - 1 : rows.start] if rows.start else None
         y = white.rows(residual_m[rows], rows.start, before).ravel()
         e = rng.standard_normal((rows.stop - rows.start, 3, draws)) * (white.weight[rows] > 0)[:, None, None]
-        square += np.matmul(x.T, x, out=product)
+        square += x.T @ x
         pull += x.T @ y
         nulls += x.T @ e.reshape(-1, draws)
         total += float(y @ y)
