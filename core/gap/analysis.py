@@ -281,12 +281,10 @@ def _as_calibrated(problem: Problem) -> tuple[Evidence, float, float, Found, Cho
     threshold = null_threshold(problem, tight)
     found = search(tight, problem.named, problem.cost, threshold)
     best = (tight, GEOMETRY_PRIORS[0], threshold, found, Chosen())
-    total = found.log_evidence + tight.nuisance_evidence
     # A looser one may take up what has a name, and is looked at where it says more of what the tight one found.
     if loose.given(found.chosen) + loose.nuisance_evidence > tight.given(found.chosen) + tight.nuisance_evidence:
         again = search(loose, problem.named, problem.cost, threshold)
-        if again.log_evidence + loose.nuisance_evidence > total:
-            best = (loose, GEOMETRY_PRIORS[1], threshold, again, Chosen())
+        best = max(best, (loose, GEOMETRY_PRIORS[1], threshold, again, Chosen()), key=_total)
     return best
 
 

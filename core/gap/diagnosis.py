@@ -19,7 +19,7 @@ from core.gap.evidence import Chosen, joined, without
 from core.gap.folds import blocks
 from core.gap.kept_out import KeptOut, mean_square
 from core.gap.observations import Observations, observe
-from core.gap.open_set import AT_FLOOR, Judge, Stand
+from core.gap.open_set import AT_FLOOR, Judge, Stand, chosen_of
 from core.gap.placement import placement_slots
 from core.gap.posterior import AT_BEST, BESIDE_UNKNOWN, adequate, floats, rivals, twins
 from core.gap.problem import Problem
@@ -35,7 +35,7 @@ from core.gap.result import (
     Rivals,
     Verdict,
 )
-from core.gap.said import Said, chosen_of, told_stands
+from core.gap.said import Said, told_stands
 from core.gap.transfer import transfers
 from core.gap.warnings_of import warnings_of
 from core.gap.where import where

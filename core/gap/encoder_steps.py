@@ -1,7 +1,6 @@
 """Steps of encoders: saw-teeth that stand out of the spectra of joint errors."""
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -34,12 +33,10 @@ def encoder_steps(sim: Sim, doings: Doings, aims_m: Sequence[Array], weight: Arr
         aims_m: residuals in which they are looked for, one set after the other, (m, 3) each.
         weight: of each point, 1/m^2, 0: left out, (m,).
     """
-    if not doings.seen.chain.coupling_gains.any():
-        return _steps_of(sim, doings, Part.DRIVE, aims_m, weight)
-    with ThreadPoolExecutor(2) as pool:
-        ways = [(doings, Part.DRIVE), (doings.uncoupled, Part.JOINT)]
-        of_motors, of_joints = pool.map(lambda way: _steps_of(sim, *way, aims_m, weight), ways)
-    return [*of_motors, *(joint_alone(one) for one in of_joints)]
+    out = _steps_of(sim, doings, Part.DRIVE, aims_m, weight)
+    if doings.seen.chain.coupling_gains.any():
+        out += [joint_alone(one) for one in _steps_of(sim, doings.uncoupled, Part.JOINT, aims_m, weight)]
+    return out
 
 
 def _steps_of(sim: Sim, doings: Doings, part: Part, aims_m: Sequence[Array], weight: Array) -> list[Candidate]:

@@ -5,6 +5,7 @@ What decides is how much of what could be explained at all a name explains on po
 against functions of the same variable, and globally, against functions of everything.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -58,6 +59,11 @@ class Stand:
     @property
     def unknown(self) -> bool:
         return self.place.effect == "unknown"
+
+
+def chosen_of(some: Sequence[Stand]) -> Chosen:
+    """All candidates that describe several causes."""
+    return joined(*(Chosen(one.groups, one.sizes) for one in some))
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +227,7 @@ def _steps_together(found: list[Stand]) -> list[Stand]:
     steps = [one for one in found if one.place.effect == "quantisation"]
     if len(steps) < 2:
         return found
-    together = joined(*(Chosen(one.groups, one.sizes) for one in steps))
+    together = chosen_of(steps)
     local = min(one.local for one in steps)
     rest = [one for one in found if one.place.effect != "quantisation"]
     return [*rest, Stand(Place("quantisation"), together.groups, together.sizes, local)]

@@ -11,7 +11,7 @@ from scipy.special import expit
 
 from core.gap.effects.candidate import motors
 from core.gap.evidence import Chosen, joined, without
-from core.gap.open_set import AT_FLOOR, LOCALLY, Judge, Stand, is_slow
+from core.gap.open_set import AT_FLOOR, LOCALLY, Judge, Stand, chosen_of, is_slow
 from core.gap.result import Place
 from core.geometry import Array
 
@@ -123,8 +123,7 @@ def floats(judge: Judge, stand: Stand, named: Sequence[Stand]) -> bool:
     """Whether a joint seems to give and to lose motion, and more is left: so does play that weights hold on a flank."""
     here = {one.place.effect for one in named if one.place.joint == stand.place.joint}
     both = stand.place.effect in LOST_MOTION | {"compliance"} and "compliance" in here and bool(LOST_MOTION & here)
-    everything = joined(*(Chosen(one.groups, one.sizes) for one in named))
-    return both and judge.square(everything) > AT_FLOOR * judge.floor_m2
+    return both and judge.square(chosen_of(named)) > AT_FLOOR * judge.floor_m2
 
 
 def has_name(judge: Judge, stand: Stand) -> float:

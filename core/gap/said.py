@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.gap.analysis import Analysis
-from core.gap.evidence import Chosen, joined, without
-from core.gap.open_set import AT_FLOOR, EVERYWHERE, Judge, Stand, stands, unknown_at
+from core.gap.evidence import joined, without
+from core.gap.open_set import AT_FLOOR, EVERYWHERE, Judge, Stand, chosen_of, stands, unknown_at
 from core.gap.posterior import sufficient
 from core.gap.result import UNKNOWN, Place
 
@@ -32,11 +32,6 @@ def told_stands(analysis: Analysis) -> list[Stand]:
         for g, s in zip(everything.groups, everything.sizes, strict=True)
     ]
     return sorted(causes, key=lambda one: evidence_lost(analysis, one, causes), reverse=True)
-
-
-def chosen_of(some: Sequence[Stand]) -> Chosen:
-    """All candidates that describe several causes."""
-    return joined(*(Chosen(one.groups, one.sizes) for one in some))
 
 
 def evidence_lost(analysis: Analysis, stand: Stand, named: Sequence[Stand]) -> float:
