@@ -59,7 +59,7 @@ def _known(analysis: Analysis, groups: list[int]) -> tuple[np.ndarray, Array, Ar
     """Columns of nuisance and both rivals, their sums so far, prior precision, and the estimate of the first."""
     problem, evidence = analysis.problem, analysis.evidence
     index = np.concatenate([np.arange(problem.nuisance), evidence.index(groups)]).astype(int)
-    sums = problem.sums.square[np.ix_(index, index)]
+    sums = problem.sums.square.within(index)
     sizes = analysis.found.alone_size[groups]
     first = Chosen((groups[0],), (float(sizes[0]),))
     prior = evidence.prior(Chosen(tuple(groups), tuple(float(size) for size in sizes)))

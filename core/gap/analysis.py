@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 
@@ -158,7 +159,7 @@ def analyse(
     progress(0.1, "estimating the noise")
     first = noise = _first_noise(told_doings, residual_m, covariance, base_weight)
     aim, drawn = residual_m, False
-    for turn in range(PASSES):
+    for turn in count():
         progress((turn + 0.5) / (PASSES + 1), "searching for causes")
         white = whitening(noise.covariance_m2, noise.weight, noise.memory)
         problem = pose_problem(sim, told_doings, library, aim, white)
@@ -170,13 +171,16 @@ def analyse(
         better = bool(fresh) if turn == 0 else _matter(fresh, problem, best)
         settled = _settled(noise, learnt.noise) and straight and not better
         if settled or turn == PASSES - 1:
-            break
+            evidence, prior, threshold, found, given = best
+            found = plainer(problem, evidence, found, given)
+            return Analysis(
+                sim, told_doings, problem, evidence, prior, threshold, found, given, noise, residual_m, placed
+            )
         noise, library = learnt.noise, [*library, *fresh]
         if not straight:
             sim, aim = learnt.sim, learnt.residual_m
-    evidence, prior, threshold, found, given = best
-    found = plainer(problem, evidence, found, given)
-    return Analysis(sim, told_doings, problem, evidence, prior, threshold, found, given, noise, residual_m, placed)
+        # The largest things in memory are not held twice.
+        del problem, best
 
 
 @dataclass(frozen=True, eq=False)
@@ -389,7 +393,7 @@ def _spent(problem: Problem, evidence: Evidence, prior: float, chosen: Chosen) -
     """Degrees of freedom that a fit takes: the trace of its hat matrix."""
     index = np.concatenate([np.arange(problem.nuisance), evidence.index(chosen.groups)]).astype(int)
     precision = np.concatenate([problem.nuisance_precision(prior), evidence.prior(chosen)])
-    square = problem.sums.square[np.ix_(index, index)]
+    square = problem.sums.square.within(index)
     return float(np.trace(np.linalg.solve(square + np.diag(precision), square)))
 
 
@@ -397,7 +401,7 @@ def numbers(problem: Problem, evidence: Evidence, prior: float, chosen: Chosen) 
     """Columns of placement, geometry and chosen candidates, and their estimates from all points."""
     index = np.concatenate([np.arange(problem.nuisance), evidence.index(chosen.groups)]).astype(int)
     precision = np.concatenate([problem.nuisance_precision(prior), evidence.prior(chosen)])
-    square = problem.sums.square[np.ix_(index, index)] + np.diag(precision)
+    square = problem.sums.square.within(index) + np.diag(precision)
     return index, np.linalg.solve(square, problem.sums.pull[index])
 
 

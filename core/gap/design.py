@@ -1,6 +1,6 @@
 """Columns of candidates over points: derivative of every point with respect to every unknown number."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,8 +10,6 @@ from core.gap.doings import Doings
 from core.gap.effects.candidate import Candidate, Column
 from core.gap.sim import Sim, Slot
 from core.geometry import Array
-
-CHUNK_ROWS = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,27 +31,26 @@ class Design:
 
     @cached_property
     def _terms(self) -> tuple[np.ndarray, np.ndarray, Array]:
-        """Slot and column of every term, (t,), and its feature, (m, t)."""
+        """Slot and column of every term, (t,), and its feature, (t, m)."""
         number = {slot: k for k, slot in enumerate(self._slots)}
         slot = [number[s] for column in self.columns for s, _ in column]
         of = [c for c, column in enumerate(self.columns) for _ in column]
-        feature = np.stack([f * self.scale[c] for c, column in enumerate(self.columns) for _, f in column], axis=1)
+        feature = np.stack([f * self.scale[c] for c, column in enumerate(self.columns) for _, f in column])
         return np.array(slot), np.array(of), feature
 
-    def block(self, rows: slice) -> Array:
-        """The columns over some points, (r, 3, p)."""
-        slot, of, feature = self._terms
-        fields = self.sim.part(rows).fields(self._slots)
-        terms = fields[:, :, slot] * feature[rows][:, None, :]
-        if len(slot) == self.count:
-            return terms
-        return np.add.reduceat(terms, np.searchsorted(of, np.arange(self.count)), axis=2)
+    def fields(self) -> Array:
+        """How the points answer to every small motion that a column makes, (m, 3, slots)."""
+        return self.sim.fields(self._slots)
 
-    def chunks(self) -> Iterator[slice]:
-        """Rows in pieces that fit into memory."""
-        m = self.sim.seen.count
-        for start in range(0, m, CHUNK_ROWS):
-            yield slice(start, min(start + CHUNK_ROWS, m))
+    def spread(self, fields: Array) -> Array:
+        """The columns, (p, 3, m), with answers of the points to small motions, (slots, 3, m)."""
+        slot, of, feature = self._terms
+        first = np.searchsorted(of, np.arange(self.count))
+        out = fields[slot[first]]
+        out *= feature[first][:, None]
+        for t in np.setdiff1d(np.arange(len(of)), first):
+            out[of[t]] += fields[slot[t]] * feature[t]
+        return out
 
     def some(self, columns: Sequence[int] | np.ndarray) -> "Design":
         """The same with some of the columns."""
@@ -61,7 +58,7 @@ class Design:
 
     def whole(self) -> Array:
         """All columns over all points, (m, 3, p); for few columns."""
-        return np.concatenate([self.block(rows) for rows in self.chunks()])
+        return np.ascontiguousarray(self.spread(self.fields().transpose(2, 1, 0)).transpose(2, 1, 0))
 
     def motions(self, numbers: Array) -> dict[Slot, Array]:
         """The small motions that the columns make with these unknown numbers, (p,)."""

@@ -19,12 +19,12 @@ def detection_limits(problem: Problem, evidence: Evidence, threshold: float) -> 
     for k in problem.named:
         candidate = problem.candidates[k]
         column = problem.slices[k].start
-        square = evidence.square[column, column]
+        square = evidence.square.block(k)[0, 0]
         if not square > 1e-12:
             continue
         number = np.sqrt((needed + 2 * problem.cost[k] + np.log1p(square)) / square)
         unit = next(unit for unit in UNITS if candidate.names[0].endswith(f"_{unit}"))
-        moved = np.sqrt(problem.sums.square[column, column] / max(problem.sums.count / 3, 1)) * number * noise_m
+        moved = np.sqrt(problem.sums.square.block(k)[0, 0] / max(problem.sums.count / 3, 1)) * number * noise_m
         limit = DetectionLimit(candidate.place, float(number * problem.design.scale[column]), unit, float(moved))
         place = candidate.place
         key = (place.effect, place.joint, place.source, place.frame, place.target)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from core.gap.gram import Gram
+from core.gap.products import Reduced
 from core.geometry import Array
 
 SIZES = 10.0 ** np.linspace(-2.0, 3.0, 21)
@@ -71,32 +72,30 @@ class Evidence:
     """The first so many columns are nuisance."""
     precision: Array
     """Prior precision of the nuisance columns, (nuisance,)."""
-    slices: tuple[slice, ...]
-    """Columns of each group."""
+
+    @property
+    def slices(self) -> tuple[slice, ...]:
+        """Columns of each group."""
+        return self.sums.square.slices
 
     @cached_property
-    def _eliminated(self) -> tuple[Array, Array, Array, float]:
+    def _eliminated(self) -> tuple[Reduced, Array, Array, float]:
         n = self.nuisance
-        own = self.sums.square[:n, :n]
+        first = self.sums.square.rows(np.arange(n))
+        own = first[:, :n]
         # Base and targets may stand for each other: what no prior tells apart, rounding must not either.
         inner = own + np.diag(np.maximum(self.precision, LEAST_PRECISION * np.diag(own)))
         factor = cho_factor(inner)
-        solved = cho_solve(
-            factor, np.column_stack([self.sums.square[:n], self.sums.pull[:n], self.sums.null_pulls[:n]])
-        )
-        p = self.sums.square.shape[0]
-        # In place: the squares are by far the largest thing in memory.
-        square = self.sums.square[:, :n] @ solved[:, :p]
-        np.subtract(self.sums.square, square, out=square)
-        pull = self.sums.pull - self.sums.square[:, :n] @ solved[:, p]
-        nulls = self.sums.null_pulls - self.sums.square[:, :n] @ solved[:, p + 1 :]
-        explained = self.sums.pull[:n] @ solved[:, p]
+        placed, noise = (cho_solve(factor, part[:n]) for part in (self.sums.pull, self.sums.null_pulls))
+        pull = self.sums.pull - first.T @ placed
+        nulls = self.sums.null_pulls - first.T @ noise
+        explained = self.sums.pull[:n] @ placed
         occam = np.linalg.slogdet(inner)[1] - np.sum(np.log(np.maximum(self.precision, 1e-300)))
-        return square, pull, nulls, 0.5 * (explained - occam)
+        return Reduced(self.sums.square, first, cho_solve(factor, first)), pull, nulls, 0.5 * (explained - occam)
 
     @property
-    def square(self) -> Array:
-        """X'X without what nuisance explains, (p, p)."""
+    def square(self) -> Reduced:
+        """X'X without what nuisance explains."""
         return self._eliminated[0]
 
     @property
@@ -122,7 +121,7 @@ class Evidence:
     def solution(self, chosen: Chosen) -> Array:
         """Estimates of the columns of chosen groups."""
         index = self.index(chosen.groups)
-        return np.linalg.solve(self.square[np.ix_(index, index)] + np.diag(self.prior(chosen)), self.pull[index])
+        return np.linalg.solve(self.square.within(index) + np.diag(self.prior(chosen)), self.pull[index])
 
     def given(self, chosen: Chosen) -> float:
         """Log evidence of chosen groups together, with their scales, above nuisance alone."""
@@ -130,7 +129,7 @@ class Evidence:
             return 0.0
         index = self.index(chosen.groups)
         prior = self.prior(chosen)
-        inner = self.square[np.ix_(index, index)] + np.diag(prior)
+        inner = self.square.within(index) + np.diag(prior)
         explained = self.pull[index] @ np.linalg.solve(inner, self.pull[index])
         occam = np.linalg.slogdet(inner)[1] - np.sum(np.log(prior))
         hyper = sum(0.5 * np.log10(size) ** 2 for size in chosen.sizes)
@@ -153,13 +152,9 @@ class Evidence:
     def bases(self) -> list[tuple[np.ndarray, Array, Array]]:
         """Group numbers, eigenvalues and eigenvectors of their squares, for groups of one width each."""
         out = []
-        groups = np.arange(len(self.slices))
-        for width in np.unique([s.stop - s.start for s in self.slices]):
-            mine = np.array([g for g in groups if self.slices[g].stop - self.slices[g].start == width])
-            index = np.array([np.arange(self.slices[g].start, self.slices[g].stop) for g in mine])
-            squares = self.square[index[:, :, None], index[:, None, :]]
-            values, vectors = np.linalg.eigh((squares + np.swapaxes(squares, 1, 2)) / 2)
-            out.append((mine, np.clip(values, 0.0, None), vectors))
+        for one in self.square.stacks:
+            values, vectors = np.linalg.eigh((one.squares + np.swapaxes(one.squares, 1, 2)) / 2)
+            out.append((one.groups, np.clip(values, 0.0, None), vectors))
         return out
 
     def null_maxima(self, cost: Array) -> Array:
@@ -175,17 +170,18 @@ class Evidence:
         """Squares and pulls of groups of one width at a time, what is chosen taken out."""
         if chosen.groups:
             index = self.index(chosen.groups)
-            inner = self.square[np.ix_(index, index)] + np.diag(self.prior(chosen))
-            solved = np.linalg.solve(inner, np.column_stack([self.square[index], self.pull[index]]))
-        widths = np.array([self.slices[g].stop - self.slices[g].start for g in groups])
-        for width in np.unique(widths):
-            places = np.flatnonzero(widths == width)
-            starts = np.array([self.slices[g].start for g in groups[places]])
-            columns = starts[:, None] + np.arange(width)
-            squares = self.square[columns[:, :, None], columns[:, None, :]]
+            rows = self.square.rows(index)
+            inner = rows[:, index] + np.diag(self.prior(chosen))
+            solved = np.linalg.solve(inner, np.column_stack([rows, self.pull[index]]))
+        for one in self.square.stacks:
+            places = np.flatnonzero(np.isin(groups, one.groups))
+            if not len(places):
+                continue
+            mine = np.searchsorted(one.groups, groups[places])
+            columns, squares = one.columns[mine], one.squares[mine]
             pulls = self.pull[columns]
             if chosen.groups:
-                across = self.square[columns[:, :, None], index]
+                across = np.moveaxis(rows[:, columns], 0, 2)
                 squares = squares - across @ np.moveaxis(solved[:, :-1][:, columns], 0, 1)
                 pulls = pulls - across @ solved[:, -1]
             yield places, squares, pulls

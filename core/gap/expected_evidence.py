@@ -19,6 +19,7 @@ from core.gap.analysis import AS_CALIBRATED
 from core.gap.evidence import Chosen, Evidence, best_sizes
 from core.gap.gram import Gram
 from core.gap.problem import Problem
+from core.gap.products import OfSquare
 from core.geometry import Array
 
 TRIED = 10.0 ** np.linspace(-4.0, 4.0, 161)
@@ -41,20 +42,20 @@ def granting(problem: Problem, granted: Chosen, groups: Sequence[int], more: Arr
     index = np.concatenate(
         [np.arange(problem.nuisance), columns_of(problem, granted.groups), columns_of(problem, groups)]
     ).astype(int)
-    square = problem.sums.square[np.ix_(index, index)]
+    square = problem.sums.square.whole[np.ix_(index, index)]
     widths = [problem.slices[g].stop - problem.slices[g].start for g in granted.groups]
     prior = np.repeat([1 / size**2 for size in granted.sizes], widths)
     precision = np.concatenate([problem.nuisance_precision(AS_CALIBRATED), prior])
     ends = len(precision) + np.cumsum([0, *(problem.slices[g].stop - problem.slices[g].start for g in groups)])
+    slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
     sums = Gram(
-        square if more is None else square + more,
+        OfSquare(square if more is None else square + more, slices),
         np.zeros(len(index)),
         0.0,
         problem.sums.count,
         np.zeros((len(index), 0)),
     )
-    slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
-    return Evidence(sums, len(precision), precision, slices)
+    return Evidence(sums, len(precision), precision)
 
 
 def expected_evidence(evidence: Evidence, acting: Sequence[int], size: Array) -> Array:
@@ -63,13 +64,13 @@ def expected_evidence(evidence: Evidence, acting: Sequence[int], size: Array) ->
     Args:
         size: standard deviation of the numbers of each acting group, (acting,).
     """
-    rows = evidence.index(acting)
+    across = evidence.square.rows(evidence.index(acting))
     widths = [evidence.slices[g].stop - evidence.slices[g].start for g in acting]
     starts = np.cumsum([0, *widths[:-1]])
     out = np.empty((len(acting), len(evidence.slices)))
     for groups, spectrum, vectors in evidence.bases:
         index = np.array([np.arange(evidence.slices[g].start, evidence.slices[g].stop) for g in groups])
-        pulls = np.moveaxis(evidence.square[rows][:, index], 0, 1) @ vectors
+        pulls = np.moveaxis(across[:, index], 0, 1) @ vectors
         power = np.add.reduceat(pulls**2, starts, axis=1) * size[None, :, None] ** 2 + spectrum[:, None, :]
         out[:, groups] = best_sizes(spectrum, np.sqrt(np.swapaxes(power, 1, 2)))[0].T
     return out

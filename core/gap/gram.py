@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.gap.design import Design
+from core.gap.products import OfColumns, Products
 from core.gap.whitening import Whitening
 from core.geometry import Array
 
@@ -13,8 +14,7 @@ from core.geometry import Array
 class Gram:
     """Whitened columns X and residual y: X'X, X'y, y'y."""
 
-    square: Array
-    """(p, p)"""
+    square: Products
     pull: Array
     """(p,)"""
     total: float
@@ -24,28 +24,27 @@ class Gram:
     """X'e for draws of noise, (p, draws)."""
 
 
-def gram(design: Design, residual_m: Array, white: Whitening, draws: int, seed: int) -> Gram:
-    """Sums over all points, chunk by chunk.
+def whitened(design: Design, white: Whitening) -> Array:
+    """X', (p, 3 m): all of x of the points, then all of y, then all of z."""
+    fields = white.apart(design.fields())
+    columns = design.spread(np.ascontiguousarray(fields.transpose(2, 1, 0)))
+    white.unlink(columns)
+    return columns.reshape(design.count, -1)
+
+
+def gram(columns: Array, slices: tuple[slice, ...], residual_m: Array, white: Whitening, draws: int, seed: int) -> Gram:
+    """Sums over all points.
 
     Args:
+        columns: X', (p, 3 m), as ``whitened`` gives it.
+        slices: columns of each group.
         residual_m: real minus sim, (m, 3).
         draws: how many draws of noise of the same weights are summed beside the residual.
         seed: of the draws.
     """
-    p, m = design.count, design.sim.seen.count
-    square, pull, nulls, total = np.zeros((p, p)), np.zeros(p), np.zeros((p, draws)), 0.0
-    rng = np.random.default_rng(seed)
-    previous: Array | None = None
-    for rows in design.chunks():
-        block = design.block(rows)
-        x = white.rows(block, rows.start, previous).reshape(-1, p)
-        before = residual_m[rows.start - 1 : rows.start] if rows.start else None
-        y = white.rows(residual_m[rows], rows.start, before).ravel()
-        e = rng.standard_normal((rows.stop - rows.start, 3, draws)) * (white.weight[rows] > 0)[:, None, None]
-        square += x.T @ x
-        pull += x.T @ y
-        nulls += x.T @ e.reshape(-1, draws)
-        total += float(y @ y)
-        previous = block[-1:]
-    count = 3 * int(np.count_nonzero(white.weight[:m]))
-    return Gram(square, pull, total, count, nulls)
+    m = len(residual_m)
+    y = white.rows(residual_m).T.ravel()
+    noise = np.random.default_rng(seed).standard_normal((m, 3, draws)) * (white.weight > 0)[:, None, None]
+    nulls = columns @ noise.transpose(1, 0, 2).reshape(3 * m, draws)
+    count = 3 * int(np.count_nonzero(white.weight))
+    return Gram(OfColumns(columns, slices), columns @ y, float(y @ y), count, nulls)

@@ -84,8 +84,8 @@ class Field:
     @cached_property
     def strength(self) -> Array:
         """What a size of one moves the coordinates by, in noise standard deviations rms, (g,)."""
-        diagonal, count = np.diag(self.problem.sums.square), max(self.problem.sums.count, 1)
-        return np.sqrt([diagonal[self.problem.slices[g]].sum() / count for g in self.groups])
+        square, count = self.problem.sums.square, max(self.problem.sums.count, 1)
+        return np.sqrt([np.trace(square.block(g)) / count for g in self.groups])
 
     @cached_property
     def stated(self) -> Array:

@@ -134,7 +134,7 @@ class Judge:
         problem = self.problem
         index = np.concatenate([np.arange(problem.nuisance), self.evidence.index(everything.groups)]).astype(int)
         prior = np.concatenate([self.evidence.precision, self.evidence.prior(everything)])
-        square = problem.sums.square[np.ix_(index, index)] + np.diag(prior)
+        square = problem.sums.square.within(index) + np.diag(prior)
         return np.linalg.solve(square, problem.sums.pull[index])[problem.placement : problem.nuisance]
 
     @cached_property

@@ -10,9 +10,9 @@ from core.gap.doings import Doings
 from core.gap.effects.candidate import Candidate, Column
 from core.gap.effects.structure import geometry_slots
 from core.gap.evidence import Evidence
-from core.gap.gram import Gram, gram
+from core.gap.gram import Gram, gram, whitened
 from core.gap.placement import placement_priors, placement_slots
-from core.gap.sim import Sim, Slot
+from core.gap.sim import Sim
 from core.gap.whitening import Whitening
 from core.geometry import Array
 
@@ -50,7 +50,7 @@ class Problem:
         return np.concatenate([free, np.full(self.geometry, 1 / geometry_prior**2)])
 
     def evidence(self, geometry_prior: float) -> Evidence:
-        return Evidence(self.sums, self.nuisance, self.nuisance_precision(geometry_prior), self.slices)
+        return Evidence(self.sums, self.nuisance, self.nuisance_precision(geometry_prior))
 
     @property
     def cost(self) -> Array:
@@ -80,38 +80,32 @@ def pose_problem(
     nuisance: list[Column] = [[(slot, ones)] for slot in (*placement, *geometry)]
     columns, sizes, slices = candidate_columns(candidates, doings)
     start = len(nuisance)
-    slices = [slice(s.start + start, s.stop + start) for s in slices]
+    own = tuple(slice(s.start + start, s.stop + start) for s in slices)
     scale = np.concatenate([np.ones(start), sizes])
     design = Design(sim, (*nuisance, *columns), scale)
-    sums = gram(design, residual_m, white, NULL_DRAWS, NULL_SEED)
-    unit = _units(sums, slices, start)
-    # In place: nobody else holds these sums, and they are large.
-    for part, by in ((sums.square, unit), (sums.square.T, unit), (sums.pull, unit), (sums.null_pulls.T, unit)):
-        part *= by
+    whole = whitened(design, white)
+    unit = _units(whole, own, 3 * int(np.count_nonzero(white.weight)))
+    # In place: nobody else holds these columns, and they are large.
+    whole *= unit[:, None]
     return Problem(
         sim,
         doings,
         tuple(candidates),
         Design(sim, design.columns, scale * unit),
-        tuple(slices),
+        own,
         len(placement),
         len(geometry),
         placement_priors(sim.seen, placement),
         residual_m,
         white,
-        sums,
+        gram(whole, own, residual_m, white, NULL_DRAWS, NULL_SEED),
     )
 
 
-def _units(sums: Gram, slices: list[slice], start: int) -> Array:
-    """Factors that make the columns of each group one noise standard deviation rms."""
-    diagonal = np.diag(sums.square)
-    unit = np.ones(len(diagonal))
+def _units(columns: Array, slices: Sequence[slice], count: int) -> Array:
+    """Factors that make the columns (p, 3 m) of each group one noise standard deviation rms over the components."""
+    energy = np.einsum("pn,pn->p", columns, columns)
+    unit = np.ones(len(energy))
     for group in slices:
-        unit[group] = 1 / np.sqrt(max(diagonal[group].mean() / max(sums.count, 1), 1e-300))
-    unit[:start] = 1.0
+        unit[group] = 1 / np.sqrt(max(energy[group].mean() / max(count, 1), 1e-300))
     return unit
-
-
-def slots_of(columns: Sequence[Column]) -> list[Slot]:
-    return [column[0][0] for column in columns]

@@ -56,11 +56,11 @@ def _drawn(problem: Problem, evidence: Evidence) -> Drawn | None:
     rng = np.random.default_rng(SEED)
     places = _places(problem)
     named, nameless = problem.named, problem.nameless
-    seen = [g for g in named if np.trace(evidence.square[problem.slices[g], problem.slices[g]]) > 1.0]
+    seen = [g for g in named if np.trace(evidence.square.block(g)) > 1.0]
     if not seen or not len(nameless):
         return None
     worlds = min(WORLDS, evidence.null_pulls.shape[1])
-    pulls, truth = evidence.null_pulls[:, :worlds].copy(), np.zeros(worlds, dtype=int)
+    numbers, truth = np.zeros((len(evidence.pull), worlds)), np.zeros(worlds, dtype=int)
     kinds = np.unique(places[seen])
     for w in range(worlds):
         kind = rng.choice(kinds)
@@ -69,9 +69,9 @@ def _drawn(problem: Problem, evidence: Evidence) -> Drawn | None:
         for g, share in ((truth[w], 1.0), (rng.choice(nameless), STRANGE)):
             own = problem.slices[g]
             shape = rng.standard_normal(own.stop - own.start)
-            energy = float(shape @ evidence.square[own, own] @ shape)
-            pulls[:, w] += evidence.square[:, own] @ shape * (share * size / np.sqrt(max(energy, 1e-12)))
-    return Drawn(truth, pulls)
+            energy = float(shape @ evidence.square.block(g) @ shape)
+            numbers[own, w] += shape * (share * size / np.sqrt(max(energy, 1e-12)))
+    return Drawn(truth, evidence.null_pulls[:, :worlds] + evidence.square.times(numbers))
 
 
 def _places(problem: Problem) -> np.ndarray:

@@ -21,18 +21,36 @@ class Whitening:
     piece: np.ndarray | None = None
     """Pieces that are taken as unrelated, so that one may be kept out, (m,); None: all is one."""
 
-    def rows(self, values: Array, first: int = 0, before: Array | None = None) -> Array:
-        """Values (r, 3, ...) of rows first.. whitened; ``before``: those of the row before the first, (1, 3, ...)."""
-        r = slice(first, first + len(values))
-        out = self._one(values, r)
+    def rows(self, values: Array) -> Array:
+        """Values of the points, (m, 3, ...), whitened."""
+        out = self.apart(values)
+        if self.correlation:
+            own, before = (part.reshape(-1, *([1] * (out.ndim - 1))) for part in self._mix)
+            mixed = own * out
+            mixed[1:] -= before[1:] * out[:-1]
+            return mixed
+        return out
+
+    def apart(self, values: Array) -> Array:
+        """Values of the points, (m, 3, ...), each whitened by itself."""
+        flat = values.reshape(len(values), 3, -1)
+        return ((self.root @ flat) * np.sqrt(self.weight)[:, None, None]).reshape(values.shape)
+
+    def unlink(self, columns: Array) -> None:
+        """Columns of values, (p, 3, m), each whitened by itself: less the point before, in place."""
         if not self.correlation:
-            return out
-        previous = np.concatenate(
-            [np.zeros_like(out[:1]) if before is None else self._one(before, slice(first - 1, first)), out[:-1]]
-        )
-        linked = self._linked[r].reshape(-1, *([1] * (out.ndim - 1)))
-        mixed = (out - self.correlation * previous) / np.sqrt(1 - self.correlation**2)
-        return np.where(linked, mixed, out)
+            return
+        own, before = self._mix
+        for column in columns:
+            linked = before[1:] * column[:, :-1]
+            column *= own
+            column[:, 1:] -= linked
+
+    @cached_property
+    def _mix(self) -> tuple[Array, Array]:
+        """What is taken of each point and of the point before, (m,) each."""
+        rest = np.sqrt(1 - self.correlation**2)
+        return np.where(self._linked, 1 / rest, 1.0), np.where(self._linked, self.correlation / rest, 0.0)
 
     @cached_property
     def _linked(self) -> np.ndarray:
@@ -42,11 +60,6 @@ class Whitening:
         if self.piece is not None:
             linked[1:] &= self.piece[1:] == self.piece[:-1]
         return linked
-
-    def _one(self, values: Array, rows: slice) -> Array:
-        flat = values.reshape(len(values), 3, -1)
-        out = (self.root[rows] @ flat) * np.sqrt(self.weight[rows])[:, None, None]
-        return out.reshape(values.shape)
 
 
 def whitening(covariance_m2: Array, weight: Array, correlation: float = 0.0) -> Whitening:

@@ -1,4 +1,4 @@
-"""Columns and their sums: in chunks as in one go, scaled alike; the noise that is drawn beside them is white."""
+"""Columns and their sums: asked for in pieces as in one go, scaled alike; the noise drawn beside them is white."""
 
 from dataclasses import replace
 
@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from gap_arms import ARMS, Day, day
 
-from core.gap import design as design_module
 from core.gap.design import Design, candidate_columns
 from core.gap.doings import doings
-from core.gap.gram import gram
+from core.gap.gram import gram, whitened
 from core.gap.library import candidates
 from core.gap.problem import Problem, pose_problem
 from core.gap.sim import Part, Sim, Slot
@@ -37,15 +36,17 @@ def posed(name: str, seed: int, correlation: float = 0.0) -> tuple[Problem, Arra
 
 @pytest.mark.parametrize("name", ["coupled", "dh with slides"])
 @pytest.mark.parametrize("correlation", [0.0, 0.6])
-def test_sums_in_chunks_are_the_direct_products(name: str, correlation: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(design_module, "CHUNK_ROWS", 17)
+def test_sums_are_the_direct_products(name: str, correlation: float) -> None:
     problem, residual = posed(name, 1, correlation)
     p = problem.design.count
-    assert problem.sim.seen.count > 3 * 17
-    monkeypatch.setattr(design_module, "CHUNK_ROWS", 10**6)
     x = problem.white.rows(problem.design.whole()).reshape(-1, p)
     y = problem.white.rows(residual).ravel()
-    np.testing.assert_allclose(problem.sums.square, x.T @ x, atol=1e-9 * np.abs(x.T @ x).max())
+    square, most = x.T @ x, np.abs(x.T @ x).max()
+    rng = np.random.default_rng(9)
+    some = [rng.choice(p, 7), np.arange(5), rng.choice(p, 30)]
+    for index in some:
+        np.testing.assert_allclose(problem.sums.square.rows(index), square[index], atol=1e-9 * most)
+    np.testing.assert_allclose(problem.sums.square.whole, square, atol=1e-9 * most)
     np.testing.assert_allclose(problem.sums.pull, x.T @ y, atol=1e-9 * np.abs(x.T @ y).max())
     assert problem.sums.total == pytest.approx(y @ y)
     assert problem.sums.count == 3 * np.count_nonzero(problem.white.weight)
@@ -67,7 +68,7 @@ def test_motions_are_what_columns_are_the_derivative_of() -> None:
     """moved_m(motions(x)) leaves the sim along the columns, for all groups together that any point shows."""
     problem, _ = posed("dh with slides", 3)
     numbers = np.random.default_rng(3).normal(size=problem.design.count)
-    numbers *= (1e-4 / np.abs(numbers).max()) * (np.diag(problem.sums.square) > 0)
+    numbers *= (1e-4 / np.abs(numbers).max()) * (np.diag(problem.sums.square.whole) > 0)
     moved = problem.sim.moved_m(problem.design.motions(numbers)) - problem.sim.points_m()
     expected = problem.design.whole() @ numbers
     np.testing.assert_allclose(moved, expected, atol=1e-4 * np.abs(expected).max())
@@ -76,7 +77,7 @@ def test_motions_are_what_columns_are_the_derivative_of() -> None:
 def test_every_group_is_one_noise_standard_deviation_rms() -> None:
     """Mean square over coordinates and columns of a group; 0 where no point that counts moves."""
     problem, _ = posed("coupled", 4)
-    diagonal = np.diag(problem.sums.square) / problem.sums.count
+    diagonal = np.diag(problem.sums.square.whole) / problem.sums.count
     unit = np.array([diagonal[group].mean() for group in problem.slices])
     moving = unit != 0
     assert np.count_nonzero(~moving) < 0.01 * len(unit)
@@ -102,9 +103,11 @@ def test_drawn_noise_has_the_sums_that_white_noise_has() -> None:
     ones = np.ones(sim.seen.count)
     design = Design(sim, tuple([(slot, ones)] for slot in slots), np.ones(4))
     white = replace(noise_of(sim, 6, 0.0), weight=np.where(np.arange(sim.seen.count) % 5, 1.0, 0.0))
-    sums = gram(design, np.zeros((sim.seen.count, 3)), white, draws=4000, seed=1)
-    size = np.sqrt(np.diag(sums.square))
+    columns = whitened(design, white)
+    sums = gram(columns, (), np.zeros((sim.seen.count, 3)), white, draws=4000, seed=1)
+    square = sums.square.whole
+    size = np.sqrt(np.diag(square))
     found = np.cov(sums.null_pulls) / size[:, None] / size
-    np.testing.assert_allclose(found, sums.square / size[:, None] / size, atol=5 / np.sqrt(4000))
-    again = gram(design, np.zeros((sim.seen.count, 3)), white, draws=4000, seed=1)
+    np.testing.assert_allclose(found, square / size[:, None] / size, atol=5 / np.sqrt(4000))
+    again = gram(columns, (), np.zeros((sim.seen.count, 3)), white, draws=4000, seed=1)
     np.testing.assert_array_equal(sums.null_pulls, again.null_pulls)

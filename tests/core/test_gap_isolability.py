@@ -115,7 +115,7 @@ class TestExpectedEvidence:
         with_priors = np.vstack([y, np.zeros((len(sigma), y.shape[1]))])
         left = with_priors - q @ (q.T @ with_priors)
         expected = left.T @ left
-        here = found.square[found.nuisance :, found.nuisance :]
+        here = found.square.whole[found.nuisance :, found.nuisance :]
         np.testing.assert_allclose(here, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
     def test_it_is_the_mean_over_drawn_worlds(self) -> None:
@@ -126,10 +126,10 @@ class TestExpectedEvidence:
         acting, size = 3, 0.6
         found = expected_evidence(evidence, [acting], np.array([size]))[0]
         tail = slice(evidence.nuisance, None)
-        values, vectors = np.linalg.eigh(evidence.square[tail, tail])
+        values, vectors = np.linalg.eigh(evidence.square.whole[tail, tail])
         noise = (vectors * np.sqrt(np.clip(values, 0, None))) @ rng.standard_normal((len(values), draws))
         numbers = size * rng.standard_normal((len(evidence.index([acting])), draws))
-        pulls = evidence.square[:, evidence.index([acting])] @ numbers
+        pulls = evidence.square.whole[:, evidence.index([acting])] @ numbers
         pulls[tail] += noise
         for members, spectrum, basis in evidence.bases:
             for k, g in enumerate(members):
