@@ -368,7 +368,7 @@ def _probability(found: Findings, stand: Stand, others: Chosen) -> tuple[float, 
     if stand.groups[0] in found.analysis.given.groups:
         # The geometry as a whole is settled by points kept out; this is about the one frame.
         return _significance(found, stand), (stand.place,)
-    probability, alike = twins(found.judge, stand, rivals(found.judge, stand, others))
+    probability, alike = twins(found.judge, stand, others, rivals(found.judge, stand, others))
     beside = BESIDE_UNKNOWN if found.stands[0].unknown else 1.0
     if floats(found.judge, stand, found.named):
         beside = min(beside, AT_BEST)

@@ -138,7 +138,7 @@ class Evidence:
     def gains(self, groups: np.ndarray, chosen: Chosen = NOTHING) -> Gains:
         """What each group would add to what is chosen."""
         evidence, size = np.empty(len(groups)), np.empty(len(groups))
-        for places, squares, pulls in self._conditioned(groups, chosen):
+        for places, squares, pulls in self.conditioned(groups, chosen):
             spectrum, pulls = _spectra(squares, pulls[:, :, None])
             evidence[places], size[places] = (part[:, 0] for part in best_sizes(spectrum, pulls))
         return Gains(evidence, size)
@@ -166,7 +166,7 @@ class Evidence:
             best = np.maximum(best, (evidence - cost[mine, None]).max(axis=0))
         return best
 
-    def _conditioned(self, groups: np.ndarray, chosen: Chosen) -> Iterator[tuple[np.ndarray, Array, Array]]:
+    def conditioned(self, groups: np.ndarray, chosen: Chosen) -> Iterator[tuple[np.ndarray, Array, Array]]:
         """Squares and pulls of groups of one width at a time, what is chosen taken out."""
         if chosen.groups:
             index = self.index(chosen.groups)

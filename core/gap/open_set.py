@@ -15,6 +15,7 @@ from core.gap.effects import drives
 from core.gap.effects.candidate import Candidate
 from core.gap.evidence import NOTHING, Chosen, Evidence, joined, without
 from core.gap.kept_out import KeptOut
+from core.gap.plausible import own, plausible
 from core.gap.problem import Problem
 from core.gap.result import Place
 from core.geometry import Array
@@ -25,6 +26,8 @@ RIPPLE = 6.0
 EXACT, EXACTLY = frozenset({"zero_offset", "ratio", "eccentricity", "mesh"}), 0.96
 """Smooth effects whose forms are exact must close nearly all, down to the noise with all else that was found: whatever
 is smooth looks like them otherwise."""
+FORMED, OUTDONE = frozenset({"zero_offset", "ratio", "eccentricity", "linkage"}), 0.015
+"""Effects of one joint of which a function without a name explains no more by such a share of the evidence."""
 FEWEST_TEETH = 3.0
 """Times a turn."""
 LOCALLY = 0.92
@@ -101,6 +104,10 @@ class Judge:
             key = f"joint {place.joint}" if place.joint is not None else str(place.variable)
             out.setdefault(key, []).append(int(k))
         return {key: np.array(members) for key, members in out.items()}
+
+    def nameless_of(self, variable: str) -> np.ndarray:
+        """Nameless functions of one variable."""
+        return self._variables.get(variable, np.zeros(0, dtype=int))
 
     @cached_property
     def rest(self) -> Chosen:
@@ -260,10 +267,26 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Cho
         imitate = any(_smooth(judge.problem.candidates[g]) for g in beside.groups)
         if not named and spot.share([first]) >= MOSTLY and not imitate:
             named = _names(replace(spot, here=_pick(here, spot.forms(first)), elsewhere=joined(elsewhere, beside)))
-    if named:
+    if named and all(_right(judge, one, joined(elsewhere, chosen_of(named))) for one in named):
         return named
     groups = joined(local, here)
     return [Stand(unknown_at(variable), groups.groups, groups.sizes, spot.share(spot.order[:1]))]
+
+
+def _right(judge: Judge, stand: Stand, others: Chosen) -> bool:
+    """Whether a name does not only stand in for something: by its numbers, and by what has no name; all else given."""
+    rest = without(joined(judge.given, others), stand.groups[:1])
+    one = own(judge.problem, judge.evidence, stand.groups[0], stand.sizes[0], rest)
+    return plausible(one, judge.problem.sim.seen.chain) and not _outdone(judge, stand, rest)
+
+
+def _outdone(judge: Judge, stand: Stand, others: Chosen) -> bool:
+    """Whether functions without a name of the same joint are by far more probable than a name whose form is exact."""
+    if stand.place.effect not in FORMED:
+        return False
+    variable = judge.variable(stand.place)
+    gains = judge.evidence.gains(np.array([stand.groups[0], *judge.nameless_of(variable)]), others).evidence
+    return bool(gains[1:].max(initial=-np.inf) > (1 + OUTDONE) * gains[0])
 
 
 def unknown_at(variable: str) -> Place:

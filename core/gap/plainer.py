@@ -1,39 +1,58 @@
-"""A freer form gives way to a plain one that explains nearly as much: hysteresis can do all that play does."""
+"""A name that only stands in gives way to what explains nearly as much: hysteresis can do all that play does."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from core.gap.evidence import Chosen, Evidence, joined
+from core.gap.plausible import own, plausible
 from core.gap.problem import Problem
 from core.gap.search import Found
 
 PLAINER = 0.95
-"""Of the evidence for a hysteresis: where play has as much, it is play."""
+"""Of the evidence for a free form: where a plain one has as much, it is that."""
 
 
 def plainer(problem: Problem, evidence: Evidence, found: Found, given: Chosen) -> Found:
-    """What was found, with play in place of every hysteresis that explains hardly more.
+    """What was found, with what explains hardly less in place of every name that only stands in for something.
+
+    Play is put in place of hysteresis, and anything in place of what has numbers that its effect never has.
 
     Args:
         given: candidates that are there whatever was found.
     """
-    chosen, main = (_with_play(problem, evidence, one, given) for one in (found.chosen, found.main))
-    worth = main if found.worth is found.main else _with_play(problem, evidence, found.worth, given)
-    return replace(found, chosen=chosen, main=main, worth=worth)
+
+    def better(chosen: Chosen) -> Chosen:
+        for k in range(len(chosen.groups)):
+            chosen = _replaced(problem, evidence, chosen, k, given)
+        return chosen
+
+    chosen, main = better(found.chosen), better(found.main)
+    return replace(found, chosen=chosen, main=main, worth=main if found.worth is found.main else better(found.worth))
 
 
-def _with_play(problem: Problem, evidence: Evidence, chosen: Chosen, given: Chosen) -> Chosen:
-    for k, group in enumerate(chosen.groups):
-        place = problem.candidates[group].place
-        if place.effect != "hysteresis":
-            continue
-        play, rest = replace(place, effect="backlash"), chosen.without(k)
-        plays = [g for g in problem.named if problem.candidates[g].place.same_as(play) and g not in rest.groups]
-        gains = evidence.gains(np.array([group, *plays]), joined(given, rest))
-        score = gains.evidence - problem.cost[[group, *plays]]
-        best = int(np.argmax(score[1:])) + 1 if plays else 0
-        if best and score[best] >= PLAINER * score[0]:
-            chosen = Chosen((*rest.groups, int(plays[best - 1])), (*rest.sizes, float(gains.size[best])))
-            return _with_play(problem, evidence, chosen, given)
+def _replaced(problem: Problem, evidence: Evidence, chosen: Chosen, k: int, given: Chosen) -> Chosen:
+    """A choice with its k-th candidate replaced, where that only stands in."""
+    group, rest = chosen.groups[k], chosen.without(k)
+    others, chain = joined(given, rest), problem.sim.seen.chain
+    place = problem.candidates[group].place
+    impossible = not plausible(own(problem, evidence, group, chosen.sizes[k], others), chain)
+    if not impossible and place.effect != "hysteresis":
+        return chosen
+    play = replace(place, effect="backlash")
+    places = {int(g): problem.candidates[g].place for g in problem.named if g not in others.groups}
+    among = np.array([g for g, p in places.items() if (not p.same_as(place) if impossible else p.same_as(play))])
+    if not len(among):
+        return chosen
+    gains = evidence.gains(among, others)
+    mine = float(evidence.gains(np.array([group]), others).evidence[0]) - problem.cost[group]
+    score = gains.evidence - problem.cost[among]
+    for best in np.argsort(score)[::-1]:
+        if score[best] < PLAINER * mine:
+            break
+        size = float(gains.size[best])
+        if plausible(own(problem, evidence, int(among[best]), size, others), chain):
+            groups, sizes = list(chosen.groups), list(chosen.sizes)
+            groups[k], sizes[k] = int(among[best]), size
+            return Chosen(tuple(groups), tuple(sizes))
     return chosen

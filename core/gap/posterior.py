@@ -12,6 +12,7 @@ from scipy.special import expit
 from core.gap.effects.candidate import motors
 from core.gap.evidence import Chosen, joined, without
 from core.gap.open_set import AT_FLOOR, LOCALLY, Judge, Stand, chosen_of, is_slow
+from core.gap.plausible import mostly_idle, own
 from core.gap.result import Place
 from core.geometry import Array
 
@@ -30,7 +31,8 @@ BESIDE_UNKNOWN = 0.4
 """How much less a name is worth that is told after something without a name."""
 AT_BEST, LIKE_LOST_MOTION = 0.5, frozenset({"mesh", "quantisation"})
 """Where one joint alone moves, everything is some function of it; where nobody wrote down how points were reached, lost
-motion looks like ripple; anything smooth looks like a mesh of few teeth: no such name is likelier than not."""
+motion looks like ripple; anything smooth looks like a mesh of few teeth; where a form's numbers are mostly idle, a
+plainer one would do: no such name is likelier than not."""
 TWIN_ODDS = 0.05
 """A candidate at least so probable beside the named one is its twin."""
 
@@ -126,22 +128,26 @@ def floats(judge: Judge, stand: Stand, named: Sequence[Stand]) -> bool:
     return both and judge.square(chosen_of(named)) > AT_FLOOR * judge.floor_m2
 
 
-def has_name(judge: Judge, stand: Stand) -> float:
+def has_name(judge: Judge, stand: Stand, others: Chosen) -> float:
     """Probability that some name of the library is right, from how much nameless functions would still add."""
+    rest = without(joined(judge.given, others), stand.groups[:1])
+    free = mostly_idle(own(judge.problem, judge.evidence, stand.groups[0], stand.sizes[0], rest))
     told, most = judge.problem.doings, 1.0
     slow = is_slow(judge.problem.candidates[stand.groups[0]])
     unlogged = stand.place.effect in LIKE_LOST_MOTION and not told.past.complete
-    if len(motors(told)) < 2 or unlogged or slow:
+    if len(motors(told)) < 2 or unlogged or slow or free:
         most = AT_BEST
     return most * float(expit((stand.local - NAMED_AT) / NAMED_WIDTH))
 
 
-def twins(judge: Judge, stand: Stand, ranked: list[tuple[Place, float]]) -> tuple[float, tuple[Place, ...]]:
+def twins(
+    judge: Judge, stand: Stand, others: Chosen, ranked: list[tuple[Place, float]]
+) -> tuple[float, tuple[Place, ...]]:
     """Probability of the place that stands, and the places that the data cannot tell from it, itself first."""
     mine = next((p for place, p in ranked if place.same_as(stand.place)), 0.0)
-    others = [
+    alike = [
         place
         for place, p in ranked
         if place is not NO_CAUSE and not place.same_as(stand.place) and p >= TWIN_ODDS * max(mine, 1e-12)
     ]
-    return mine * has_name(judge, stand), (stand.place, *others[:11])
+    return mine * has_name(judge, stand, others), (stand.place, *alike[:11])

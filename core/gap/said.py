@@ -74,10 +74,11 @@ class Said:
         order = [one for one in order if self._matters(one, order)]
         if self._faint(order):
             order = []
-        unknown = self._unknown([one for one in judged if one.unknown], order)
-        one = None if self.analysis.given.groups else self._one_for_all(order)
+        located = [one for one in judged if one.unknown]
+        unknown = self._unknown(located, order)
+        one = None if self.analysis.given.groups else self._one_for_all([*order, *located])
         if one is not None:
-            rest = [other for other in unknown if not other.place.same_as(one.place)]
+            rest = [other for other in unknown if other not in located and not other.place.same_as(one.place)]
             return [one, *self._adding(order, [one, *rest]), *rest]
         if order and not self.analysis.given.groups and not self._enough(order):
             return [*self._stood_in_for(order, unknown), *(self._adding(order, unknown) if unknown else order)]
@@ -96,16 +97,16 @@ class Said:
             return False
         return sufficient(self.judge, chosen) >= 0.5
 
-    def _one_for_all(self, named: list[Stand]) -> Stand | None:
-        """One thing without a name that leaves less of kept-out points than names at several places; None: none."""
+    def _one_for_all(self, several: list[Stand]) -> Stand | None:
+        """One thing without a name that leaves less of kept-out points than what is at several places; None: none."""
         judge = self.judge
-        if len({judge.variable(one.place) for one in named}) < 2 or not judge.local:
+        if len({judge.variable(one.place) for one in several}) < 2 or not judge.local:
             return None
-        if judge.open.square_m2(joined(chosen_of(named), judge.found)) < AT_FLOOR * judge.floor_m2:
+        if judge.open.square_m2(joined(chosen_of(several), judge.found)) < AT_FLOOR * judge.floor_m2:
             return None
         left = {variable: judge.open.square_m2(chosen) for variable, chosen in judge.local.items()}
         best = min(left, key=left.__getitem__)
-        if judge.open.square_m2(chosen_of(named)) < left[best]:
+        if judge.open.square_m2(chosen_of(several)) < left[best]:
             return None
         return Stand(unknown_at(best), judge.local[best].groups, judge.local[best].sizes, 0.0)
 
