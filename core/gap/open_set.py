@@ -281,10 +281,14 @@ def _right(judge: Judge, stand: Stand, others: Chosen) -> bool:
 
 
 def _outdone(judge: Judge, stand: Stand, others: Chosen) -> bool:
-    """Whether functions without a name of the same joint are by far more probable than a name whose form is exact."""
-    if stand.place.effect not in FORMED:
-        return False
+    """Whether functions without a name of the same joint are by far more probable than a name whose form is exact.
+
+    What acts elsewhere as well may have left what they explain.
+    """
     variable = judge.variable(stand.place)
+    alone = all(judge.variable(judge.problem.candidates[g].place) == variable for g in judge.found.groups)
+    if stand.place.effect not in FORMED or not alone:
+        return False
     gains = judge.evidence.gains(np.array([stand.groups[0], *judge.nameless_of(variable)]), others).evidence
     return bool(gains[1:].max(initial=-np.inf) > (1 + OUTDONE) * gains[0])
 
