@@ -204,10 +204,11 @@ def stands(judge: Judge) -> list[Stand]:
     by_variable: dict[str, list[int]] = {}
     for k, group in enumerate(kept.groups):
         by_variable.setdefault(judge.variable(judge.problem.candidates[group].place), []).append(k)
-    for variable, members in by_variable.items():
-        here = _pick(kept, members)
+    places = {variable: _pick(kept, members) for variable, members in by_variable.items()}
+    foremost = min(places, key=lambda variable: judge.square(places[variable]), default=None)
+    for variable, here in places.items():
         elsewhere, small = _others(judge, variable, kept)
-        out += _at(judge, variable, here, elsewhere, small)
+        out += _at(judge, variable, here, elsewhere, small, variable == foremost)
     return _steps_together(out)
 
 
@@ -252,8 +253,13 @@ def _predicting(judge: Judge, chosen: Chosen) -> Chosen:
     return chosen
 
 
-def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Chosen) -> list[Stand]:
-    """Names at one variable, or that it is unknown what acts there."""
+def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Chosen, foremost: bool) -> list[Stand]:
+    """Names at one variable, or that it is unknown what acts there.
+
+    Args:
+        foremost: whether nothing elsewhere closes as much alone; numbers of what is weaker are blurred too much to
+            doubt its name by them.
+    """
     local = judge.local.get(variable, Chosen())
     spot = Spot(judge, here, local, elsewhere)
     named = _names(spot)
@@ -267,7 +273,7 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Cho
         imitate = any(_smooth(judge.problem.candidates[g]) for g in beside.groups)
         if not named and spot.share([first]) >= MOSTLY and not imitate:
             named = _names(replace(spot, here=_pick(here, spot.forms(first)), elsewhere=joined(elsewhere, beside)))
-    if named and all(_right(judge, one, joined(elsewhere, chosen_of(named))) for one in named):
+    if named and (not foremost or all(_right(judge, one, joined(elsewhere, chosen_of(named))) for one in named)):
         return named
     groups = joined(local, here)
     return [Stand(unknown_at(variable), groups.groups, groups.sizes, spot.share(spot.order[:1]))]

@@ -22,8 +22,8 @@ from core.robot import Robot
 AGAINST = frozenset({"backlash", "hysteresis", "compliance"})
 """What loses motion lags behind, and what gives way gives way to the load: its first number is not negative."""
 BENDS = frozenset({"compliance", "flexure"})
-UNWEIGHED = 0.5
-"""Of what it gives way: what does so under what it carries gives way under its own weight as well."""
+UNWEIGHED = 0.3
+"""What gives way under what it carries does so under its own weight too: a share below which it does not."""
 SURELY = 3.0
 """Standard deviations."""
 GRADUALLY = 0.7
@@ -117,7 +117,7 @@ def _weightless(one: Own) -> bool:
     moved = dict(zip(one.candidate.names, one.numbers**2 * np.diag(one.square), strict=True))
     most = max((name for name in moved if name.startswith("give_")), key=lambda name: moved[name])
     give = one.values[most]
-    return one.values.get(f"own_weight_{most}", 0.0) * np.sign(give) < -UNWEIGHED * abs(give)
+    return abs(one.values.get(f"own_weight_{most}", 0.0) + give) < UNWEIGHED * abs(give)
 
 
 def _cancels(one: Own) -> bool:
