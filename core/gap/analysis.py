@@ -11,7 +11,7 @@ from core.gap.design import Design
 from core.gap.doings import Doings, doings
 from core.gap.effects.candidate import Candidate
 from core.gap.encoder_steps import encoder_steps
-from core.gap.evidence import Chosen, Evidence, joined
+from core.gap.evidence import NOTHING, Chosen, Evidence, joined
 from core.gap.folds import blocks
 from core.gap.kept_out import KNOWN, KeptOut
 from core.gap.library import candidates
@@ -112,18 +112,36 @@ def _fitted(seen: Observations) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """How well geometry is known, and what is found then."""
+
+    evidence: Evidence
+    geometry_prior: float
+    """rad and m"""
+    threshold: float
+    """Log evidence that noise alone hardly ever makes."""
+    found: Found
+    given: Chosen = NOTHING
+    """Geometry and zero offsets that are off by more than a calibration leaves, as the whole of the data says."""
+
+    @property
+    def everything(self) -> Chosen:
+        return joined(self.given, self.found.chosen)
+
+    @property
+    def total(self) -> float:
+        """Log evidence of everything together: placement, geometry, what is given and what was found."""
+        return self.found.log_evidence + self.evidence.nuisance_evidence
+
+
+@dataclass(frozen=True, eq=False)
 class Analysis:
     """One campaign, searched."""
 
     sim: Sim
     doings: Doings
     problem: Problem
-    evidence: Evidence
-    geometry_prior: float
-    threshold: float
-    found: Found
-    given: Chosen
-    """Geometry and zero offsets that are off by more than a calibration leaves, as the whole of the data says."""
+    best: Hypothesis
     noise: NoiseFound
     residual_m: Array
     """Real minus placed sim, (m, 3), about the placement that was fitted alone."""
@@ -131,8 +149,28 @@ class Analysis:
     """That sim."""
 
     @property
+    def evidence(self) -> Evidence:
+        return self.best.evidence
+
+    @property
+    def geometry_prior(self) -> float:
+        return self.best.geometry_prior
+
+    @property
+    def threshold(self) -> float:
+        return self.best.threshold
+
+    @property
+    def found(self) -> Found:
+        return self.best.found
+
+    @property
+    def given(self) -> Chosen:
+        return self.best.given
+
+    @property
     def everything(self) -> Chosen:
-        return joined(self.given, self.found.chosen)
+        return self.best.everything
 
 
 def analyse(
@@ -164,18 +202,15 @@ def analyse(
         white = whitening(noise.covariance_m2, noise.weight, noise.memory)
         problem = pose_problem(sim, told_doings, library, aim, white)
         best = _best_prior(problem, float(noise.floor_m2.mean()), GEOMETRY_STAYS if drawn else GEOMETRY_CLOSES)
-        drawn = bool(best[-1].groups)
+        drawn = bool(best.given.groups)
         learnt = _learn(told_doings, problem, best, first, told, steps=turn == 0)
         fresh = [one for one in learnt.sharper if one.place.effect not in without]
         straight = learnt.bent_m2 < BENT**2 * noise.floor_m2.mean()
         better = bool(fresh) if turn == 0 else _matter(fresh, problem, best)
         settled = _settled(noise, learnt.noise) and straight and not better
         if settled or turn == PASSES - 1:
-            evidence, prior, threshold, found, given = best
-            found = plainer(problem, evidence, found, given)
-            return Analysis(
-                sim, told_doings, problem, evidence, prior, threshold, found, given, noise, residual_m, placed
-            )
+            best = replace(best, found=plainer(problem, best.evidence, best.found, best.given))
+            return Analysis(sim, told_doings, problem, best, noise, residual_m, placed)
         noise, library = learnt.noise, [*library, *fresh]
         if not straight:
             sim, aim = learnt.sim, learnt.residual_m
@@ -205,14 +240,13 @@ def _settled(before: NoiseFound, after: NoiseFound) -> bool:
     return bool(same and np.abs(after.weight - before.weight).mean() < 0.003)
 
 
-def _matter(fresh: list[Candidate], problem: Problem, best: tuple[Evidence, float, float, Found, Chosen]) -> bool:
+def _matter(fresh: list[Candidate], problem: Problem, best: Hypothesis) -> bool:
     """Whether fresh candidates beside or instead of what was found say notably more."""
-    _, prior, threshold, found, given = best
     known = {(one.place, one.atom) for one in problem.candidates}
     fresh = [one for one in fresh if (one.place, one.atom) not in known]
     if not fresh:
         return False
-    old = joined(given, found.chosen)
+    old, given, prior = best.everything, best.given, best.geometry_prior
     few = pose_problem(
         problem.sim,
         problem.doings,
@@ -221,10 +255,12 @@ def _matter(fresh: list[Candidate], problem: Problem, best: tuple[Evidence, floa
         problem.white,
     )
     there = Chosen(tuple(range(len(given.groups))), given.sizes)
-    again = search(few.evidence(prior), np.arange(len(given.groups), len(few.candidates)), few.cost, threshold, there)
+    again = search(
+        few.evidence(prior), np.arange(len(given.groups), len(few.candidates)), few.cost, best.threshold, there
+    )
     before = few.evidence(prior).given(Chosen(tuple(range(len(old.groups))), old.sizes))
     before -= float(few.cost[len(given.groups) : len(old.groups)].sum())
-    return again.log_evidence > before + threshold + NOTABLY * max(before, 0.0)
+    return again.log_evidence > before + best.threshold + NOTABLY * max(before, 0.0)
 
 
 def _first_noise(told: Doings, residual_m: Array, covariance: Array, weight: Array) -> NoiseFound:
@@ -253,7 +289,7 @@ def _rescaled(covariance: Array, variance: float) -> Array:
     return covariance + extra * np.eye(3)
 
 
-def _best_prior(problem: Problem, floor_m2: float, closes: float) -> tuple[Evidence, float, float, Found, Chosen]:
+def _best_prior(problem: Problem, floor_m2: float, closes: float) -> Hypothesis:
     """The geometry prior under which everything together is most probable, and what is found with it.
 
     Args:
@@ -267,28 +303,22 @@ def _best_prior(problem: Problem, floor_m2: float, closes: float) -> tuple[Evide
         return calibrated
     # As drawn: data enough overcome any prior, and what is fitted along must not hide what is off.
     drawn = _as_drawn(problem)
-    if _total(drawn) < _total(calibrated):
+    if drawn.total < calibrated.total:
         return calibrated
     beyond = _kept_out_m2(problem, drawn, AS_CALIBRATED) - floor_m2
     return drawn if beyond < closes * (left - floor_m2) else calibrated
 
 
-def _total(found: tuple[Evidence, float, float, Found, Chosen]) -> float:
-    """Log evidence of everything together: placement, geometry, what is given and what was found."""
-    evidence, _, _, names, _ = found
-    return names.log_evidence + evidence.nuisance_evidence
-
-
-def _as_calibrated(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
+def _as_calibrated(problem: Problem) -> Hypothesis:
     """The prior under which everything together is most probable, and what is found with it."""
     tight, loose = (problem.evidence(prior) for prior in GEOMETRY_PRIORS)
     threshold = null_threshold(problem, tight)
     found = search(tight, problem.named, problem.cost, threshold)
-    best = (tight, GEOMETRY_PRIORS[0], threshold, found, Chosen())
+    best = Hypothesis(tight, GEOMETRY_PRIORS[0], threshold, found)
     # A looser one may take up what has a name, and is looked at where it says more of what the tight one found.
     if loose.given(found.chosen) + loose.nuisance_evidence > tight.given(found.chosen) + tight.nuisance_evidence:
         again = search(loose, problem.named, problem.cost, threshold)
-        best = max(best, (loose, GEOMETRY_PRIORS[1], threshold, again, Chosen()), key=_total)
+        best = max(best, Hypothesis(loose, GEOMETRY_PRIORS[1], threshold, again), key=lambda one: one.total)
     return best
 
 
@@ -300,12 +330,12 @@ def _geometry_strays(problem: Problem) -> bool:
     return bool(np.sum(strays**2) > STRAY**2 * len(strays))
 
 
-def _kept_out_m2(problem: Problem, found: tuple[Evidence, float, float, Found, Chosen], prior: float) -> float:
+def _kept_out_m2(problem: Problem, one: Hypothesis, prior: float) -> float:
     """The least that a hypothesis leaves of kept-out points where geometry beside it is known to so much, m^2.
 
     With all that was found, or less: small causes may overfit, and may also be what keeps geometry from straying.
     """
-    _, _, _, names, given = found
+    names, given = one.found, one.given
     kept = KeptOut(problem, blocks(problem.sim.seen), prior, joined(given, names.chosen, names.worth).groups)
     return min(kept.square_m2(joined(given, some)) for some in (names.chosen, names.worth))
 
@@ -315,7 +345,7 @@ def null_threshold(problem: Problem, evidence: Evidence) -> float:
     return float(np.quantile(evidence.null_maxima(problem.cost), NULL_QUANTILE) + NULL_MARGIN)
 
 
-def _as_drawn(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
+def _as_drawn(problem: Problem) -> Hypothesis:
     """The search when the sim's geometry is a drawing's, off by what makes everything together most probable."""
     evidence = problem.evidence(AS_CALIBRATED)
     threshold = null_threshold(problem, evidence)
@@ -329,7 +359,7 @@ def _as_drawn(problem: Problem) -> tuple[Evidence, float, float, Found, Chosen]:
         again = search(evidence, problem.named, problem.cost, threshold, sizes[best])
         if again.log_evidence > found.log_evidence:
             found, given = again, sizes[best]
-    return evidence, AS_CALIBRATED, threshold, found, given
+    return Hypothesis(evidence, AS_CALIBRATED, threshold, found, given)
 
 
 def drawn_geometry(problem: Problem, size: float = UNCALIBRATED) -> Chosen:
@@ -345,7 +375,7 @@ def _of_geometry(candidate: Candidate) -> bool:
 def _learn(
     told: Doings,
     problem: Problem,
-    best: tuple[Evidence, float, float, Found, Chosen],
+    best: Hypothesis,
     first: NoiseFound,
     only: Callable[[Candidate], bool] | None,
     steps: bool,
@@ -355,10 +385,10 @@ def _learn(
     Args:
         steps: whether steps of encoders are looked for.
     """
-    evidence, prior, threshold, found, given = best
-    everything = joined(given, found.chosen)
+    evidence, prior, found = best.evidence, best.geometry_prior, best.found
+    given, everything = best.given, best.everything
     named_left, own = _left(problem, evidence, prior, everything)
-    flexible = _flexible(problem, evidence, everything, threshold)
+    flexible = _flexible(problem, evidence, everything, best.threshold)
     left, _ = _left(problem, evidence, prior, flexible)
     noise = _learned_noise(told, problem, _spent(problem, evidence, prior, flexible), left, first)
     scale = 3 * noise.weight / np.trace(noise.covariance_m2, axis1=1, axis2=2)

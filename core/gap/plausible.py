@@ -1,8 +1,9 @@
 """Whether the numbers of a name are such as its effect has: free forms also fit what their effects never make.
 
-A hysteresis that is lost at once is play; play that runs ahead of its motor is none; a frame that is off by a turn
-about the next axis is a zero offset; an axis whose tilts and shifts nearly cancel does not wobble. Where the library
-has the plainer name, that name is the more probable one anyway. Where it has not, something without a name acts.
+A hysteresis that is lost at once is play; play that runs ahead of its motor is none, nor is what never changes side; a
+frame that is off by a turn about the next axis is a zero offset; an axis whose tilts and shifts nearly cancel does not
+wobble. Where the library has the plainer name, that name is the more probable one anyway. Where it has not, something
+without a name acts.
 """
 
 from dataclasses import dataclass
@@ -48,6 +49,8 @@ class Own:
     """Products of its columns without what the others explain, (w, w)."""
     pull: Array
     """(w,)"""
+    constant: bool = False
+    """Whether it moves its joint by the same at every point."""
 
     @cached_property
     def covariance(self) -> Array:
@@ -67,13 +70,18 @@ class Own:
 def own(problem: Problem, evidence: Evidence, group: int, size: float, others: Chosen) -> Own:
     """A candidate with what it adds to others."""
     _, square, pull = next(evidence.conditioned(np.array([group]), others))
-    return Own(problem.candidates[group], problem.design.scale[problem.slices[group]], size, square[0], pull[0])
+    columns = problem.design.columns[problem.slices[group]]
+    constant = all(np.ptp(feature) == 0 for column in columns for _, feature in column)
+    scale = problem.design.scale[problem.slices[group]]
+    return Own(problem.candidates[group], scale, size, square[0], pull[0], constant)
 
 
 def plausible(one: Own, chain: Robot) -> bool:
     """Whether the numbers are such as the effect has."""
     effect = one.candidate.place.effect
     if effect in AGAINST and one.numbers[0] < 0 and one.pull[0] < -SURELY * np.sqrt(one.square[0, 0]):
+        return False
+    if effect == "backlash" and one.constant:
         return False
     if effect in BENDS and _weightless(one):
         return False

@@ -64,6 +64,12 @@ def test_nothing_runs_ahead_of_what_drives_it(effect: str, place: Place) -> None
     assert not plausible(best_of(problem, place), problem.sim.seen.chain)
 
 
+def test_play_that_never_changes_side_is_none() -> None:
+    form = form_of(np.array([2.0]), "backlash", ("gap_rad",))
+    assert plausible(form, crane_cell().robot)
+    assert not plausible(replace(form, constant=True), crane_cell().robot)
+
+
 def form_of(numbers: Array, effect: str, names: tuple[str, ...]) -> Own:
     """A form with such numbers, as well measured as real ones are."""
     square = 900.0 * np.eye(len(numbers))

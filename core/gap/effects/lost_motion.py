@@ -26,8 +26,6 @@ def backlashes(doings: Doings) -> list[Candidate]:
         levels = [np.inf]
         if load is not None and load > LEAST_LOAD:
             levels += [float(share * load) for share in FRICTION_SHARES]
-        # A joint that rests on one flank all the time shows no play.
-        levels = [level for level in levels if np.ptp(_flank(doings, j, level)) > 0]
         out += [_backlash(doings, j, level, len(levels)) for level in levels]
     return out
 
@@ -37,15 +35,14 @@ def hystereses(doings: Doings) -> list[Candidate]:
     return [_hysteresis(doings, j) for j in motors(doings)] if doings.past.complete else []
 
 
-def _flank(doings: Doings, joint: int, friction: float) -> Array:
-    return -doings.sense[:, joint] if np.isinf(friction) else doings.past.flank(joint, friction)
-
-
 def _backlash(doings: Doings, joint: int, friction: float, choices: int) -> Candidate:
-    began = bool((_flank(doings, joint, friction) == 0).any())
+    def side(doings: Doings) -> Array:
+        return -doings.sense[:, joint] if np.isinf(friction) else doings.past.flank(joint, friction)
+
+    began = bool((side(doings) == 0).any())
 
     def columns(doings: Doings) -> list[Column]:
-        which = _flank(doings, joint, friction)
+        which = side(doings)
         return [drive(doings, joint, one) for one in (which / 2, (which == 0).astype(float))[: 1 + began]]
 
     of = unit(doings, joint)
