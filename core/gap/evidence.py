@@ -171,8 +171,8 @@ class Evidence:
         if chosen.groups:
             index = self.index(chosen.groups)
             rows = self.square.rows(index)
-            inner = rows[:, index] + np.diag(self.prior(chosen))
-            solved = np.linalg.solve(inner, np.column_stack([rows, self.pull[index]]))
+            inverse = np.linalg.inv(rows[:, index] + np.diag(self.prior(chosen)))
+            taken = inverse @ self.pull[index]
         for one in self.square.stacks:
             places = np.flatnonzero(np.isin(groups, one.groups))
             if not len(places):
@@ -181,9 +181,10 @@ class Evidence:
             columns, squares = one.columns[mine], one.squares[mine]
             pulls = self.pull[columns]
             if chosen.groups:
-                across = np.moveaxis(rows[:, columns], 0, 2)
-                squares = squares - across @ np.moveaxis(solved[:, :-1][:, columns], 0, 1)
-                pulls = pulls - across @ solved[:, -1]
+                flat = rows[:, columns.ravel()]
+                across, solved = (part.reshape(len(index), *columns.shape) for part in (flat, inverse @ flat))
+                squares = squares - np.moveaxis(across, 0, 2) @ np.moveaxis(solved, 0, 1)
+                pulls = pulls - np.moveaxis(across, 0, 2) @ taken
             yield places, squares, pulls
 
 
