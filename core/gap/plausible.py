@@ -79,7 +79,7 @@ def own(problem: Problem, evidence: Evidence, group: int, size: float, others: C
 def plausible(one: Own, chain: Robot) -> bool:
     """Whether the numbers are such as the effect has."""
     effect = one.candidate.place.effect
-    if effect in AGAINST and one.numbers[0] < 0 and one.pull[0] < -SURELY * np.sqrt(one.square[0, 0]):
+    if effect in AGAINST and one.numbers[0] < 0 and one.pull[0] < -SURELY * np.sqrt(max(one.square[0, 0], 0.0)):
         return False
     if effect == "backlash" and one.constant:
         return False
