@@ -117,6 +117,7 @@ def _key_numbers(report: GapReport) -> tuple[tuple[str, str], ...]:
     return (
         ("Verdict", VERDICTS[report.verdict]),
         ("Gap", length_words(report.gap_rms_m)),
+        *([("Calibration moved", length_words(report.within_calibration_rms_m))] if report.calibration_matters else []),
         ("Left", length_words(report.left_rms_m)),
         ("Floor", length_words(report.noise.floor_rms_m)),
         *([("Share closed", percent(closed))] if math.isfinite(closed) and report.causes else []),

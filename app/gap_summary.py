@@ -6,7 +6,7 @@ from pathlib import Path
 from app.gap_tables import cause_parameters
 from core.gap.blind_check import Said
 from core.gap.blind_score import Confusion, Score, Share, TopOne
-from core.gap.place_words import cause_words
+from core.gap.place_words import CALIBRATION, cause_words
 from core.gap.result import Cause, GapReport, Rivals
 from core.gap.verdict_words import left_sentence, length_words, next_sentence, percent, verdict_sentence
 
@@ -25,6 +25,7 @@ def gap_summary(report: GapReport, folder: Path) -> str:
         verdict_sentence(report),
         f"  sim      {report.sim}",
         f"  gap      {gap} -> {left} (floor {floor}), rms over points kept out of the fits",
+        *_calibration_line(report),
         *(line for number, cause in enumerate(report.causes[:MOST_CAUSES], 1) for line in _cause_lines(number, cause)),
         *([f"  and {more} more causes in the report"] if (more := len(report.causes) - MOST_CAUSES) > 0 else []),
         *([f"  left     {left_sentence(report)}"] if report.causes else []),
@@ -34,6 +35,12 @@ def gap_summary(report: GapReport, folder: Path) -> str:
         f"Written: {folder / 'gap.json'}, {folder / 'corrected_points.csv'}, {folder / 'report.html'}",
     ]
     return "\n".join(lines)
+
+
+def _calibration_line(report: GapReport) -> list[str]:
+    if not report.causes or not report.calibration_matters:
+        return []
+    return [f"           {length_words(report.within_calibration_rms_m)} with {CALIBRATION}"]
 
 
 def blind_summary(said: tuple[Said, ...], score: Score, notes: tuple[str, ...], files: tuple[Path, ...]) -> str:

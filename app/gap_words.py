@@ -48,6 +48,7 @@ def numbers_words(report: GapReport) -> str:
     closed = closed_share(report)
     rows = [
         ("Gap", length_words(report.gap_rms_m)),
+        *([("Calibration moved", length_words(report.within_calibration_rms_m))] if report.calibration_matters else []),
         ("Left with all causes", length_words(report.left_rms_m)),
         ("Floor", length_words(report.noise.floor_rms_m)),
         *([("Share closed", percent(closed))] if report.causes and closed == closed else []),

@@ -18,6 +18,7 @@ from core.errors import InputError
 from core.estimate import ArmEstimate
 from core.geometry import Array, invert
 from core.measurements import Campaign
+from core.parameter_covariance import ParameterCovariance
 from core.phi_convention import Convention
 from core.phi_model import PhiModel, from_axes
 from core.robot import Robot
@@ -58,6 +59,8 @@ class CalibratedArm:
     """Title of the campaign that it was calibrated with."""
     digest: str = ""
     """SHA-256 of that campaign's files."""
+    covariance: ParameterCovariance | None = None
+    """Of geometry and drives together; None: not known."""
 
     def driven(self) -> DrivenRobot:
         """Calibrated chain and drives, for inverse kinematics in the robot's base frame; the same one every time."""
@@ -127,6 +130,7 @@ def assembled_arm(
         home=campaign.home,
         source=campaign.title,
         digest=campaign.digest,
+        covariance=estimate.covariance,
     )
 
 

@@ -17,13 +17,16 @@ from core.function_fit import FunctionFit
 from core.geometry import Array
 from core.json_records import JsonRecord, read_json
 from core.motion_forms import MotionForm, MotionFunction, coupling_form, transmission_form
+from core.parameter_covariance import COUPLING, FRAME, TRANSMISSION, Parameter, ParameterCovariance
 from core.phi_convention import Convention, convention_for
-from core.phi_model import PhiModel, axes, from_axes
+from core.phi_model import PARAMETERS, PhiModel, axes, from_axes
 from core.robot import Robot
 from core.robot_json import robot_of_record, transform_of
 from core.units import displacement_units, to_si
 
 PHI_SLACK_RAD = 1e-9
+SKEW = 1e-6
+"""Correlations that differ by less between the two halves of a covariance are rounding."""
 
 
 def read_calibration(path: Path | str) -> CalibratedArm:
@@ -57,6 +60,7 @@ def read_calibration(path: Path | str) -> CalibratedArm:
         home=_home(top, nominal),
         source=top.text("campaign") if "campaign" in top else "",
         digest=top.text("digest_sha256") if "digest_sha256" in top else "",
+        covariance=_covariance(top, estimate),
     )
 
 
@@ -155,6 +159,32 @@ def _function(record: JsonRecord, form: MotionForm, slides: bool) -> FunctionFit
         chi_square=np.nan,
         reason=record.text("reason") if "reason" in record else "",
     )
+
+
+def _covariance(top: JsonRecord, estimate: ArmEstimate) -> ParameterCovariance | None:
+    """How geometry and drives err together, if the file says it."""
+    if "covariance" not in top:
+        return None
+    record = top.record("covariance")
+    known = {str(parameter): parameter for parameter in _parameters(estimate)}
+    names = record.get("parameters")
+    if not isinstance(names, list) or len(set(map(str, names))) < len(names) or not set(map(str, names)) <= set(known):
+        raise record.wrong("parameters", "a list of parameters of this calibration, each once")
+    matrix = record.numbers("matrix", (len(names), len(names)))
+    std = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    if (np.diag(matrix) < 0).any() or (np.abs(matrix - matrix.T) > SKEW * np.outer(std, std)).any():
+        raise record.failed("matrix is not a covariance, expected a symmetric one with variances on its diagonal")
+    return ParameterCovariance(tuple(known[str(name)] for name in names), matrix)
+
+
+def _parameters(estimate: ArmEstimate) -> list[Parameter]:
+    """Everything that a calibration can have estimated."""
+    n = estimate.arm.robot.joint_count
+    out = [Parameter(FRAME, i, name) for i in range(1, n) for name in PARAMETERS]
+    for part, fits in ((TRANSMISSION, estimate.transmissions), (COUPLING, estimate.couplings)):
+        for joint, fit in enumerate(fits, 1):
+            out += [Parameter(part, joint, name) for name in (() if fit is None else fit.form.coefficient_names)]
+    return out
 
 
 def _targets(top: JsonRecord, nominal: Robot) -> tuple[KnownTarget, ...]:

@@ -40,6 +40,7 @@ def calibration_to_json(calibration: Calibration) -> str:
             "frames": _frame_records(calibration),
             "transmissions": transmission_records(calibration),
             "couplings": coupling_records(calibration),
+            "covariance": _covariance_record(calibration),
             "findings": [_finding_record(finding) for finding in calibration.findings],
             "targets": _target_records(calibration),
             "sweeps": [_sweep_record(fit) for fit in calibration.found.fits],
@@ -50,6 +51,17 @@ def calibration_to_json(calibration: Calibration) -> str:
             "nominal_robot": robot_record(calibration.campaign.robot),
         }
     )
+
+
+def _covariance_record(calibration: Calibration) -> Json | None:
+    """How the parameters err together: in SI, as their names say; constants of functions as they stand above."""
+    covariance = calibration.estimate.covariance
+    if covariance is None:
+        return None
+    return {
+        "parameters": [str(parameter) for parameter in covariance.parameters],
+        "matrix": [[number(value, 30) for value in row] for row in covariance.matrix],
+    }
 
 
 def _source_record(calibration: Calibration) -> Json:

@@ -7,6 +7,7 @@ import numpy as np
 from core.arm import Arm
 from core.function_fit import FunctionFit
 from core.geometry import Array, perpendicular_basis
+from core.parameter_covariance import ParameterCovariance
 from core.phi_model import PhiModel
 
 
@@ -43,6 +44,8 @@ class ArmEstimate:
     """None where a joint was not swept."""
     noise_m: float
     """Standard deviation of one coordinate of a point."""
+    covariance: ParameterCovariance | None = None
+    """Of geometry and drives together; None: they were not estimated together, or the geometry is not known."""
 
     def axis_std(self, joint: int) -> tuple[float, float]:
         """Standard uncertainties of direction (rad) and place (m) of the axis of a joint, 1..n."""

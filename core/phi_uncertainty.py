@@ -31,15 +31,20 @@ def geometry_from_axes(
     """
     base, model = from_axes(lines, convention)
     model = near(model, nominal)
-    free = convention.free.ravel()
-    by_axes = np.zeros((len(free), axis_covariance.shape[0]))
-    by_axes[free] = _parameters_by_axes(lines, base, model, convention)
+    by_axes = parameters_by_axes(lines, base, model, convention)
     # A sliding axis has no place: its shifts are not known, and change nothing.
     covariance = by_axes @ np.where(np.isnan(axis_covariance), 0.0, axis_covariance) @ by_axes.T
     return Geometry(base, model, np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(-1, 4), covariance)
 
 
-def _parameters_by_axes(lines: tuple[Line, ...], base: Array, model: PhiModel, convention: Convention) -> Array:
+def parameters_by_axes(lines: tuple[Line, ...], base: Array, model: PhiModel, convention: Convention) -> Array:
+    """Derivatives of all parameters by tilts and shifts of all axes, (4(n-1), 4n); 0 where fixed by agreement."""
+    out = np.zeros((convention.free.size, 4 * len(lines)))
+    out[convention.free.ravel()] = _free_by_axes(lines, base, model, convention)
+    return out
+
+
+def _free_by_axes(lines: tuple[Line, ...], base: Array, model: PhiModel, convention: Convention) -> Array:
     """Derivatives of the free parameters by tilts and shifts of all axes, (free, 4n)."""
     free, measured = convention.free.ravel(), _measured_rows(convention.sliding)
     by_parameters = axes_by_parameters(lines, base, model)[measured][:, free]

@@ -25,15 +25,16 @@ from core.arm import Arm, carry
 from core.arm_jacobian import ArmState, Prediction, net_displacements, predict
 from core.axes.result import ROUNDING_M
 from core.drives import drive_functions, offset_std
-from core.estimate import ArmEstimate
+from core.estimate import ArmEstimate, Geometry
 from core.function_fit import FunctionFit
 from core.geometry import Array, cross
 from core.measurements import Campaign
 from core.motion_forms import MotionFunction
 from core.noise import Noise
+from core.parameter_covariance import COUPLING, FRAME, TRANSMISSION, Parameter, ParameterCovariance
 from core.phi_convention import Convention
-from core.phi_model import PhiModel
-from core.phi_uncertainty import geometry_from_axes
+from core.phi_model import PARAMETERS, PhiModel
+from core.phi_uncertainty import geometry_from_axes, parameters_by_axes
 from core.refined_curves import Seen, refined_motions, with_curves
 from core.refinement_problem import RefinementProblem, Solved
 from core.sweep_fits import SweepFits
@@ -185,9 +186,10 @@ def _estimate(
 ) -> ArmEstimate:
     drives, couplings = _function_fits(campaign, problem, state, solved, start, motions)
     covariance = axis_covariance(problem, solved.covariance, len(state.axes))
-    geometry = None
+    geometry = whole = None
     if convention is not None and nominal is not None:
         geometry = geometry_from_axes(state.axes, convention, covariance, nominal)
+        whole = _parameter_covariance(problem, state, solved.covariance, convention, geometry)
     return ArmEstimate(
         method="all points at once",
         arm=Arm(campaign.robot, state.axes, drive_functions(campaign, list(drives)), state.couplings),
@@ -197,7 +199,33 @@ def _estimate(
         couplings=couplings,
         geometry=geometry,
         noise_m=noise.rms_m(problem.stated_m2),
+        covariance=whole,
     )
+
+
+def _parameter_covariance(
+    problem: RefinementProblem, state: ArmState, covariance: Array, convention: Convention, geometry: Geometry
+) -> ParameterCovariance:
+    """Axes carried over to the parameters of the phi-model, beside the constants of all functions."""
+    n, layout = len(state.axes), problem.layout
+    by_axes = parameters_by_axes(state.axes, geometry.base, geometry.model, convention)
+    parameters = [Parameter(FRAME, i, name) for i in range(1, n) for name in PARAMETERS]
+    rows = np.zeros((len(parameters), layout.size))
+    for i, place in enumerate(layout.axes):
+        if place is not None:
+            rows[:, place] = by_axes[:, 4 * i : 4 * i + place.stop - place.start]
+    constants: list[int] = []
+    for part, functions, places in (
+        (TRANSMISSION, state.transmissions, layout.transmissions),
+        (COUPLING, state.couplings, layout.couplings),
+    ):
+        for joint, (function, place) in enumerate(zip(functions, places, strict=True), 1):
+            if function is not None and place is not None:
+                parameters += [Parameter(part, joint, name) for name in function.form.coefficient_names]
+                constants += range(place.start, place.stop)
+    rows = np.concatenate([rows, np.eye(layout.size)[constants]])
+    matrix = rows @ covariance @ rows.T
+    return ParameterCovariance(tuple(parameters), (matrix + matrix.T) / 2)
 
 
 def _function_fits(

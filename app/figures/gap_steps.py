@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 
 from app.figures.sheet import Panel, stacked
 from app.figures.style import BLUE, GREY, SKY, VERMILLION, WIDE_PX, Trace, plain
-from core.gap.place_words import cause_words
+from core.gap.place_words import CALIBRATION, cause_words
 from core.gap.result import UNKNOWN, GapReport
 from core.gap.verdict_words import length_words
 
@@ -31,8 +31,12 @@ FLOOR_NAMES = {
 def gap_steps_figure(report: GapReport, width_px: int = WIDE_PX) -> go.Figure:
     """Rms length of real minus sim on kept-out points, one bar a step, from top to bottom."""
     causes = report.causes if len(report.causes) <= MOST_CAUSES else report.causes[: MOST_CAUSES - 1]
-    names = [f"Sim as it is: {report.sim}", *(f"+ {cause_words(cause)}" for cause in causes)]
-    steps = [report.gap_rms_m, *(cause.gap_after_rms_m for cause in causes)]
+    names, steps = [f"Sim as it is: {report.sim}"], [report.gap_rms_m]
+    if report.calibration_matters:
+        names.append(f"+ {CALIBRATION}")
+        steps.append(report.within_calibration_rms_m)
+    names += [f"+ {cause_words(cause)}" for cause in causes]
+    steps += [cause.gap_after_rms_m for cause in causes]
     if len(causes) < len(report.causes):
         names.append(f"+ {len(report.causes) - len(causes)} other causes")
         steps.append(report.causes[-1].gap_after_rms_m)

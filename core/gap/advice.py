@@ -16,7 +16,6 @@ import numpy as np
 from core.gap.analysis import Analysis
 from core.gap.design import Design, candidate_columns
 from core.gap.doings import doings
-from core.gap.effects.candidate import Column
 from core.gap.evidence import Chosen
 from core.gap.experiments import Block, blocks_for, observe_block
 from core.gap.problem import Problem
@@ -71,14 +70,12 @@ def block_sums(problem: Problem, block: Block, groups: list[int], columns: np.nd
     """The sums that a block would add, with the noise that the points so far have on average."""
     seen = observe_block(problem.sim.seen, block)
     told = doings(seen)
-    slots = [column[0][0] for column in problem.design.columns[: problem.nuisance]]
-    nuisance: list[Column] = [[(slot, np.ones(seen.count))] for slot in slots]
     own, _, _ = candidate_columns([problem.candidates[g] for g in groups], told)
     places = problem.sim.target_m
     added = len(block.campaign.targets) - len(places)
     offset = np.array([(0.12, -0.09, 0.08)])
     sim = replace(problem.sim, seen=seen, target_m=np.vstack([places, *([places[-1:] + offset] * added)]))
-    design = Design(sim, (*nuisance, *own), problem.design.scale[columns])
+    design = Design(sim, (*problem.nuisance_columns(seen), *own), problem.design.scale[columns])
     weight = np.sqrt(np.mean(np.sum(problem.white.root**2, axis=(1, 2))) / 3)
     flat = (design.whole() * weight).reshape(-1, len(columns))
     return flat.T @ flat

@@ -13,12 +13,12 @@ from core.gap.effects.candidate import Candidate
 from core.gap.encoder_steps import encoder_steps
 from core.gap.evidence import NOTHING, Chosen, Evidence, joined
 from core.gap.folds import blocks
-from core.gap.kept_out import KNOWN, KeptOut
+from core.gap.kept_out import KeptOut
 from core.gap.library import candidates
 from core.gap.observations import Observations
 from core.gap.placement import place, placement_slots, with_placement
 from core.gap.plainer import plainer
-from core.gap.problem import Problem, pose_problem
+from core.gap.problem import KNOWN, Problem, pose_problem
 from core.gap.scatter import joint_scatter
 from core.gap.search import Found, search
 from core.gap.sharpened import sharpened
@@ -326,7 +326,7 @@ def _geometry_strays(problem: Problem) -> bool:
     """Whether geometry alone would have to stray far beyond what a calibration leaves."""
     evidence = problem.evidence(UNCALIBRATED)
     _, estimate = numbers(problem, evidence, UNCALIBRATED, Chosen())
-    strays = estimate[problem.placement : problem.nuisance] / AS_CALIBRATED
+    strays = estimate[problem.placement : problem.nuisance - problem.doubt] / AS_CALIBRATED
     return bool(np.sum(strays**2) > STRAY**2 * len(strays))
 
 

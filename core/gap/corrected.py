@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.calibrated_arm import CalibratedArm
+from core.gap.calibration_doubt import doubt_columns
 from core.gap.doings import doings
 from core.gap.effects.candidate import Candidate
 from core.gap.kept_out import mean_square
@@ -30,6 +31,8 @@ class CorrectedSim:
     numbers: tuple[Array, ...]
     """Unknown numbers of each cause, in the units of their names."""
     geometry: tuple[tuple[Slot, float], ...]
+    doubt: Array
+    """How far the errors that the calibration knew it may have went, in their standard deviations, (d,)."""
     digest: str
     """Of the campaign it was found on."""
 
@@ -37,6 +40,9 @@ class CorrectedSim:
         """The small motions at the points of a campaign, (m,) each."""
         told = doings(seen)
         out: dict[Slot, Array] = {slot: np.full(seen.count, value) for slot, value in self.geometry}
+        for column, number in zip(doubt_columns(seen), self.doubt, strict=True):
+            for slot, feature in column:
+                out[slot] = out.get(slot, 0.0) + feature * number
         same = seen.campaign.digest == self.digest
         for cause, numbers in zip(self.causes, self.numbers, strict=True):
             if cause.place.effect in SESSION_BOUND and not same:

@@ -219,6 +219,13 @@ class Findings:
         """With all named causes."""
         return self.honest.square_m2(self.wide.chosen(self.chosen))
 
+    @property
+    def within_calibration_m(self) -> float:
+        """What is left, rms, where a calibrated sim moves within its own uncertainty alone; NaN: it states none."""
+        if not self.wide.problem.doubt:
+            return np.nan
+        return float(np.sqrt(self.square_m2(Chosen()) if self.stands else self.left_m2))
+
     @cached_property
     def expected_m2(self) -> float:
         """What noise lets expect to be left on kept-out points, fits as uncertain as they are."""
@@ -311,6 +318,7 @@ def _report(campaign: Campaign, arm: CalibratedArm | None, found: Findings) -> D
         reliability=reliability(a.problem, a.evidence, a.threshold) if gap else None,
         hold_out=HOLD_OUT,
         corrected=_corrected(arm, found),
+        within_calibration_rms_m=found.within_calibration_m,
     )
 
 
@@ -452,11 +460,13 @@ def _corrected(arm: CalibratedArm | None, found: Findings) -> CorrectedSim:
     _, numbers, _ = found.honest.fitted(chosen)
     own = [problem.design.scale[problem.slices[g]] for g in chosen.groups]
     scaled = numbers * np.concatenate([problem.design.scale[: problem.nuisance], *own])
-    slots = [column[0][0] for column in problem.design.columns[: problem.nuisance]]
-    geometry = tuple((slots[k], float(scaled[k])) for k in range(problem.placement, problem.nuisance))
+    certain = problem.nuisance - problem.doubt
+    slots = [column[0][0] for column in problem.design.columns[:certain]]
+    geometry = tuple((slots[k], float(scaled[k])) for k in range(problem.placement, certain))
     at, values = problem.nuisance, []
     for part in own:
         values.append(scaled[at : at + len(part)])
         at += len(part)
     causes = tuple(problem.candidates[g] for g in chosen.groups)
-    return CorrectedSim(arm, causes, tuple(values), geometry, found.seen.campaign.digest)
+    doubt = scaled[certain : problem.nuisance]
+    return CorrectedSim(arm, causes, tuple(values), geometry, doubt, found.seen.campaign.digest)

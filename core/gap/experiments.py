@@ -152,8 +152,6 @@ def observe_block(seen: Observations, block: Block) -> Observations:
     """The points of a block, for the same sim."""
     table = block.campaign.measurements
     rows = np.arange(table.count - block.count, table.count)
-    commanded = table.commanded[rows]
-    active = active_commands(block.campaign.robot, commanded)
-    return Observations(
-        block.campaign, seen.chain, rows, active, nominal_net(block.campaign.robot, commanded), seen.sim
-    )
+    commanded, robot, arm = table.commanded[rows], block.campaign.robot, seen.calibrated
+    net = nominal_net(robot, commanded) if arm is None else arm.drives.net(commanded)
+    return replace(seen, campaign=block.campaign, rows=rows, active=active_commands(robot, commanded), net=net)

@@ -43,6 +43,7 @@ def gap_to_json(report: GapReport) -> str:
             "gap_rms_mm": mm(report.gap_rms_m),
             "floor_rms_mm": mm(report.noise.floor_rms_m),
             "floor_source": report.noise.floor_source,
+            "within_calibration_rms_mm": mm(report.within_calibration_rms_m),
             "left_rms_mm": mm(report.left_rms_m),
             "left_is_noise": bool(report.left_test.left_is_noise),
             "left_test": {"name": report.left_test.name, "p_value": number(report.left_test.p_value)},

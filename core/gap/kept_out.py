@@ -8,11 +8,8 @@ import numpy as np
 
 from core.gap.evidence import Chosen
 from core.gap.folds import CHECK, placeable
-from core.gap.problem import Problem
+from core.gap.problem import KNOWN, Problem
 from core.geometry import Array
-
-KNOWN = 1e-9
-"""Prior of geometry that is taken as known, rad and m."""
 
 
 @dataclass(frozen=True, eq=False)

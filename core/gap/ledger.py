@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from core.gap.place_words import cause_words
+from core.gap.place_words import CALIBRATION, cause_words
 from core.gap.result import GapReport
 from core.geometry import Array
 
@@ -33,6 +33,8 @@ def ledger(report: GapReport) -> tuple[LedgerLine, ...]:
     whole, floor = report.gap_rms_m**2, report.noise.floor_rms_m**2
     parts = [(cause_words(c), c.gap_before_rms_m**2 - c.gap_after_rms_m**2) for c in report.causes]
     rest = [(BEYOND, report.left_rms_m**2 - floor), (FLOOR, floor)]
+    if report.calibration_matters:
+        parts.insert(0, (CALIBRATION, whole - report.within_calibration_rms_m**2))
     together = whole - sum(square for _, square in [*parts, *rest])
     if abs(together) > NEGLIGIBLE * whole:
         parts.append((NOT_SHARED, together))

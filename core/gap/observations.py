@@ -31,6 +31,8 @@ class Observations:
     """Net displacements as the sim has them, rad or m, (m, n)."""
     sim: str
     """What the sim is, in words."""
+    calibrated: CalibratedArm | None = None
+    """The sim, where it is a calibrated arm."""
 
     @property
     def count(self) -> int:
@@ -44,6 +46,11 @@ class Observations:
     def point_m(self) -> Array:
         """Measured points, instrument's frame, (m, 3)."""
         return self.campaign.measurements.point_m[self.rows]
+
+    @property
+    def commanded(self) -> Array:
+        """What was commanded, rad or m, (m, n)."""
+        return self.campaign.measurements.commanded[self.rows]
 
     @cached_property
     def simulated_m(self) -> Array | None:
@@ -131,11 +138,11 @@ class Observations:
     def uncoupled(self) -> "Observations":
         """The same points of an arm whose motors move one joint each: net displacements stand for those of motors."""
         chain = replace(self.chain, couplings=())
-        return Observations(self.campaign, chain, self.rows, self.net, self.net, self.sim)
+        return replace(self, chain=chain, active=self.net)
 
     def part(self, keep: np.ndarray) -> "Observations":
         """Some of the points; ``keep``: boolean (m,) or indices."""
-        return Observations(self.campaign, self.chain, self.rows[keep], self.active[keep], self.net[keep], self.sim)
+        return replace(self, rows=self.rows[keep], active=self.active[keep], net=self.net[keep])
 
 
 def observe(campaign: Campaign, arm: CalibratedArm | None = None) -> Observations:
@@ -170,7 +177,7 @@ def observe(campaign: Campaign, arm: CalibratedArm | None = None) -> Observation
             f"{campaign.robot.joint_count}"
         )
     source = f"the calibration from {arm.source!r}" if arm.source else "the calibration"
-    return Observations(campaign, arm.robot, rows, active, arm.drives.net(commanded), source)
+    return Observations(campaign, arm.robot, rows, active, arm.drives.net(commanded), source, arm)
 
 
 def placeless(campaign: Campaign) -> list[int]:

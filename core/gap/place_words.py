@@ -28,6 +28,7 @@ NAMES = {
     UNKNOWN: "unknown effect",
 }
 """Every effect of the contract, as a person calls it; the order is that of pages and tables."""
+CALIBRATION = "what the calibration leaves uncertain"
 
 MEANINGS = {
     "geometry": "A link is longer or shorter, or an axis points elsewhere, than in the sim.",

@@ -5,12 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.gap.calibration_doubt import doubt_columns
 from core.gap.design import Design, candidate_columns
 from core.gap.doings import Doings
 from core.gap.effects.candidate import Candidate, Column
 from core.gap.effects.structure import geometry_slots
 from core.gap.evidence import Evidence
 from core.gap.gram import Gram, gram, whitened
+from core.gap.observations import Observations
 from core.gap.placement import placement_priors, placement_slots
 from core.gap.sim import Sim
 from core.gap.whitening import Whitening
@@ -18,6 +20,8 @@ from core.geometry import Array
 
 FREE = 10.0
 """Prior of base and unknown targets, rad and m: none."""
+KNOWN = 1e-9
+"""Prior of geometry that is taken as known, rad and m."""
 NULL_DRAWS, NULL_SEED = 60, 11
 
 
@@ -33,7 +37,9 @@ class Problem:
     placement: int
     """The first so many columns place base and targets."""
     geometry: int
-    """So many after them change the geometry."""
+    """So many after them change the geometry of the sim."""
+    doubt: int
+    """The last so many of those are errors that a calibrated sim knows it may have, in their standard deviations."""
     placement_prior: Array
     residual_m: Array
     """Real minus sim, (m, 3)."""
@@ -47,10 +53,19 @@ class Problem:
     def nuisance_precision(self, geometry_prior: float) -> Array:
         """Prior precision of placement and of geometry known to so much, rad and m."""
         free = 1 / np.minimum(self.placement_prior, FREE) ** 2
-        return np.concatenate([free, np.full(self.geometry, 1 / geometry_prior**2)])
+        own = np.full(self.geometry, 1 / geometry_prior**2)
+        if geometry_prior > KNOWN:
+            own[self.geometry - self.doubt :] = 1.0
+        return np.concatenate([free, own])
 
     def evidence(self, geometry_prior: float) -> Evidence:
         return Evidence(self.sums, self.nuisance, self.nuisance_precision(geometry_prior))
+
+    def nuisance_columns(self, seen: Observations) -> list[Column]:
+        """The nuisance columns over other points of the same arm."""
+        ones = np.ones(seen.count)
+        slots = [column[0][0] for column in self.design.columns[: self.nuisance - self.doubt]]
+        return [*([(slot, ones)] for slot in slots), *doubt_columns(seen)]
 
     @property
     def cost(self) -> Array:
@@ -74,10 +89,9 @@ def pose_problem(
     sim: Sim, doings: Doings, candidates: Sequence[Candidate], residual_m: Array, white: Whitening
 ) -> Problem:
     """The columns of all candidates over the points, scaled so that one is one noise standard deviation rms."""
-    placement = placement_slots(sim.seen)
-    geometry = geometry_slots(doings)
+    placement, doubt = placement_slots(sim.seen), doubt_columns(sim.seen)
     ones = np.ones(sim.seen.count)
-    nuisance: list[Column] = [[(slot, ones)] for slot in (*placement, *geometry)]
+    nuisance: list[Column] = [*([(slot, ones)] for slot in (*placement, *geometry_slots(doings))), *doubt]
     columns, sizes, slices = candidate_columns(candidates, doings)
     start = len(nuisance)
     own = tuple(slice(s.start + start, s.stop + start) for s in slices)
@@ -94,7 +108,8 @@ def pose_problem(
         Design(sim, design.columns, scale * unit),
         own,
         len(placement),
-        len(geometry),
+        start - len(placement),
+        len(doubt),
         placement_priors(sim.seen, placement),
         residual_m,
         white,

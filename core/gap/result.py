@@ -1,5 +1,6 @@
 """What a diagnosis of the gap says: plain records, SI units."""
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -22,6 +23,10 @@ class Verdict(StrEnum):
 
 UNKNOWN = "unknown"
 """The effect of a cause that is located, not named."""
+
+
+NOTABLY = 0.95
+"""Of the gap: a calibration that leaves less of it takes part in it."""
 
 
 @dataclass(frozen=True)
@@ -223,3 +228,11 @@ class GapReport:
     seconds: float = 0.0
     peak_memory_mb: float = 0.0
     notes: tuple[str, ...] = field(default=())
+    within_calibration_rms_m: float = math.nan
+    """On kept-out points, with a calibrated sim moved as far as its own uncertainty lets it, before any cause; NaN: the
+    sim states none."""
+
+    @property
+    def calibration_matters(self) -> bool:
+        """Whether what a calibration leaves uncertain takes a notable part of the gap."""
+        return self.within_calibration_rms_m < NOTABLY * self.gap_rms_m

@@ -2,7 +2,7 @@
 
 import math
 
-from core.gap.place_words import cause_words, either_of, listed
+from core.gap.place_words import CALIBRATION, cause_words, either_of, listed
 from core.gap.result import UNKNOWN, Cause, GapReport, Rivals, Verdict
 from core.wording import fixed
 
@@ -22,6 +22,12 @@ def verdict_sentence(report: GapReport) -> str:
     """What is known of the gap, in one sentence. Texts from files are in it as they are."""
     gap, left, floor = (length_words(v) for v in (report.gap_rms_m, report.left_rms_m, report.noise.floor_rms_m))
     match report.verdict:
+        case Verdict.NO_GAP if report.calibration_matters:
+            return (
+                f"No gap beyond what the calibration itself leaves uncertain: on points kept out of the fits real and "
+                f"sim differ by {gap}, {left} once the calibration is moved within its own uncertainty, where noise "
+                f"alone would leave {floor}."
+            )
         case Verdict.NO_GAP if report.gap_rms_m > NEAR_FLOOR * report.noise.floor_rms_m:
             return (
                 f"No gap can be shown: on points kept out of the fits real and sim differ by {gap} where noise alone "
@@ -109,6 +115,7 @@ def _causes(report: GapReport) -> str:
     words = [f"{'an ' if c.place.effect == UNKNOWN else ''}{cause_words(c)}" for c in report.causes[:MOST_NAMED]]
     more = len(report.causes) - len(words)
     words += [f"{more} other cause{'s' if more > 1 else ''}"] if more else []
+    words += [CALIBRATION] if words and report.calibration_matters else []
     if len(words) > 1 and any(len(cause.twins) > 1 for cause in report.causes):
         # Alternatives within a list need a stronger mark between its parts.
         words = ["; ".join([*words[:-1], f"and {words[-1]}"])]
@@ -116,7 +123,7 @@ def _causes(report: GapReport) -> str:
 
 
 def _takes(report: GapReport) -> str:
-    return "take" if len(report.causes) > 1 else "takes"
+    return "take" if len(report.causes) > 1 or (report.causes and report.calibration_matters) else "takes"
 
 
 def _located(report: GapReport) -> str:

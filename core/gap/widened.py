@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from core.gap.analysis import Analysis, NoiseFound, numbers
 from core.gap.design import Design
 from core.gap.doings import doings
@@ -56,8 +54,7 @@ def widened(analysis: Analysis, seen: Observations, groups: Sequence[int], state
     candidates = [analysis.problem.candidates[g] for g in groups]
     old = analysis.problem
     index, estimate = numbers(old, analysis.evidence, analysis.geometry_prior, state)
-    ones = np.ones(seen.count)
-    columns = [[(column[0][0], ones)] for column in old.design.columns[: old.nuisance]]
+    columns = old.nuisance_columns(seen)
     columns += [column for g in state.groups for column in old.candidates[g].columns(told)]
     design = Design(sim, tuple(columns), old.design.scale[index])
     linear = design.whole() @ estimate

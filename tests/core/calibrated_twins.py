@@ -7,7 +7,8 @@ import numpy as np
 from core.calibration import calibrate
 from core.estimate import ArmEstimate
 from core.geometry import Array, Line
-from core.phi_model import PhiModel, from_axes, near
+from core.parameter_covariance import FRAME, TRANSMISSION
+from core.phi_model import PARAMETERS, PhiModel, from_axes, near
 from core.twin.campaign import simulate_campaign, truth
 from core.twin.cell import Cell, Truth
 
@@ -66,3 +67,28 @@ def scores_over_seeds(cell: Cell | None, seeds: range) -> tuple[tuple[str, ...],
             rows.append(compare(estimate, true, geometry))
     names = refined[0].names
     return names, np.array([c.scores for c in refined]), np.array([c.scores for c in first])
+
+
+def joint_scores(cell: Cell, seed: int) -> Array:
+    """Errors of geometry and drives in independent standard deviations, (k,): standard normal if covariances are."""
+    found, true = calibrate(simulate_campaign(seed, cell)), truth(cell)
+    estimate = found.estimate
+    geometry = true_geometry(true, estimate, found.convention, found.nominal)
+    errors = []
+    for one in estimate.covariance.parameters:
+        if one.part == FRAME:
+            row = one.number - 1, PARAMETERS.index(one.name)
+            errors.append(estimate.geometry.model.parameters[row] - geometry.parameters[row])
+            continue
+        fits, functions = (
+            (estimate.transmissions, true.arm.transmissions)
+            if one.part == TRANSMISSION
+            else (estimate.couplings, true.arm.couplings)
+        )
+        fit = fits[one.number - 1]
+        k = fit.form.coefficient_names.index(one.name)
+        errors.append(fit.coefficients[k] - functions[one.number - 1].coefficients[k])
+    roots = estimate.covariance.roots()
+    scores, *_ = np.linalg.lstsq(roots, np.array(errors), rcond=None)
+    np.testing.assert_allclose(roots @ scores, errors, atol=1e-9)
+    return scores

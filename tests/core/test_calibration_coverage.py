@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calibrated_twins import scores_over_seeds
+from calibrated_twins import joint_scores, scores_over_seeds
 
 from core.twin import irb_l6, scara
 
@@ -37,3 +37,10 @@ def test_estimates_are_not_biased(scores):
     bias = refined.mean(axis=0) * np.sqrt(SEEDS)
     worst = int(np.argmax(np.abs(bias)))
     assert abs(bias[worst]) < 4.5, names[worst]
+
+
+@pytest.mark.parametrize("cell", [irb_l6.cell, scara.cell], ids=["irb_l6", "scara"])
+def test_parameters_err_together_as_their_covariance_says(cell):
+    scores = np.stack([joint_scores(cell(), seed) for seed in range(7000, 7040)])
+    # The mean of so many squares of standard normal numbers scatters by sqrt(2 / count).
+    assert np.mean(scores**2) == pytest.approx(1.0, abs=4 * np.sqrt(2 / scores.size))

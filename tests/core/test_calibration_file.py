@@ -49,6 +49,11 @@ def test_the_arm_that_is_read_is_the_one_that_was_written(which: str, tmp_path: 
     for one, other in zip(found.targets, expected.targets, strict=True):
         np.testing.assert_allclose(one.point_m, other.point_m, rtol=0, atol=1e-11)
         np.testing.assert_allclose(one.std_m, other.std_m, rtol=1e-9)
+    assert found.covariance.parameters == expected.covariance.parameters
+    std = np.sqrt(np.diag(expected.covariance.matrix))
+    np.testing.assert_allclose(
+        found.covariance.matrix, expected.covariance.matrix, rtol=0, atol=1e-10 * np.outer(std, std).max()
+    )
     assert (found.home is None) == (expected.home is None)
     if expected.home is not None:
         np.testing.assert_allclose(found.home, expected.home, rtol=0, atol=1e-11)
@@ -140,6 +145,11 @@ WRONG = [
     (put("nominal_robot", "couplings", 0, "to", 5), ["nominal_robot.couplings[0]"]),
     (put("base_to_instrument", 3, [1, 0, 0, 1]), ["base_to_instrument", "rigid"]),
     (put("home_deg", 2, None), ["home_deg"]),
+    (put("covariance", "parameters", 0, "frame 9 a_m"), ["covariance.parameters", "of this calibration"]),
+    (put("covariance", "parameters", 0, "frame 1 b_m"), ["covariance.parameters", "each once"]),
+    (put("covariance", "matrix", 0, 1, 7.0), ["covariance", "symmetric"]),
+    (put("covariance", "matrix", 5, 5, -1.0), ["covariance", "variances"]),
+    (put("covariance", "matrix", 3, [1.0]), ["covariance.matrix", "numbers"]),
 ]
 
 
@@ -169,6 +179,10 @@ def test_what_is_no_calibration_is_refused(text: str, word: str, tmp_path: Path)
     path.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=word):
         read_calibration(path)
+
+
+def test_a_calibration_that_says_nothing_of_how_it_errs_is_read(tmp_path: Path) -> None:
+    assert read_calibration(written(tmp_path, edit=drop("covariance"))).covariance is None
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
