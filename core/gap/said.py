@@ -19,7 +19,7 @@ MANY, MANY_LEAVE = 3, 4.0
 """Names that together leave too much: none of their joints is where something acts. More of them than that must leave
 less than so many floors (mean squares), or they only imitate something else."""
 ONE_JOINT = 0.8
-"""Of the evidence for functions of the whole configuration: where one joint's have as much, it is that joint."""
+"""Of the evidence for functions of time or configuration: where one joint's have as much, it is that joint."""
 FAINT = 1.3
 """Times the noise (mean squares) of what does not stand out of it by itself."""
 
@@ -57,13 +57,16 @@ class Said:
         return out
 
     def _sharper(self, place: Place) -> Place:
-        """A joint instead of the whole configuration, where an error of that joint alone says nearly as much."""
-        if place.variable != "configuration":
+        """A joint instead of time or the whole configuration, where an error of that joint alone says nearly as much.
+
+        Play that nothing holds on a flank wanders, and what wanders looks like something that depends on time.
+        """
+        if place.variable not in ("configuration", "time"):
             return place
         evidence = {variable: self.analysis.evidence.given(chosen) for variable, chosen in self.judge.local.items()}
         of_joints = {variable: value for variable, value in evidence.items() if variable.startswith("joint")}
         best = max(of_joints, key=of_joints.__getitem__, default=None)
-        if best is None or of_joints[best] < ONE_JOINT * evidence.get("configuration", 0.0):
+        if best is None or of_joints[best] < ONE_JOINT * evidence.get(place.variable, 0.0):
             return place
         return unknown_at(best)
 
