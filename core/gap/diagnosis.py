@@ -51,7 +51,7 @@ CLOSED = 0.9
 """Share of the gap beyond the floor that causes must close to explain it."""
 ALL_NEEDED = 0.7
 """What all that was found leaves of kept-out points over what fewer names leave, where the small ones are real."""
-NEARLY = 2.0
+NEARLY = 1.6
 """Floors that may be left at most where causes explain a gap."""
 BEYOND_NOISE = 2.0
 """Times what noise lets expect: where kept-out points are farther off, there is a gap, whatever the search says."""

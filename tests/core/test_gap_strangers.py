@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gap_cells import crane_cell, measured
+from scipy.signal import lfilter
 
 from core.gap.analysis import analyse
 from core.gap.diagnosis import Findings, diagnose
@@ -44,10 +45,28 @@ def hose(sim: Sim) -> Array:
     return sim.moved_m({Slot(Part.DRIVE, 1): angle}) - sim.points_m()
 
 
+def wander(sim: Sim) -> Array:
+    """Joint 1 floats in its play: wherever it was left, it nearly stays."""
+    steps = np.random.default_rng(1).normal(size=sim.seen.standstill.max() + 1)
+    floating = np.clip(lfilter([np.sqrt(1 - 0.9**2)], [1.0, -0.9], steps), -1.5, 1.5)
+    return sim.moved_m({Slot(Part.DRIVE, 0): 1e-4 * floating[sim.seen.standstill]}) - sim.points_m()
+
+
+def sway(sim: Sim) -> Array:
+    """The whole arm sways to and fro in the course of the day."""
+    phase = np.array([0.3, 1.9, 4.0])
+    return 2e-4 * np.sin(7.0 * sim.seen.time[:, None] + phase)
+
+
 @pytest.mark.parametrize(
     ("field", "place_"),
-    [(refraction, Place(UNKNOWN, variable="configuration")), (hose, Place(UNKNOWN, joint=2))],
-    ids=["bent room", "joint by another"],
+    [
+        (refraction, Place(UNKNOWN, variable="configuration")),
+        (hose, Place(UNKNOWN, joint=2)),
+        (wander, Place(UNKNOWN, joint=1)),
+        (sway, Place(UNKNOWN, variable="time")),
+    ],
+    ids=["bent room", "joint by another", "floating joint", "swaying base"],
 )
 def test_what_has_no_name_is_located(field: Field, place_: Place) -> None:
     found = diagnose(bent(measured(crane_cell()), field))
