@@ -23,7 +23,7 @@ SAME = 0.02
 TOGETHER, NAMED_ONLY = "Left with all of them", "Left by the corrected sim: causes that have a name"
 FLOOR_NAMES = {
     "repeats": "Floor: repeated measurements scatter so",
-    "sigma": "Floor: the instrument's noise",
+    "sigma": "Floor: the noise as stated",
     "unknown": "Floor: estimated from the residuals",
 }
 

@@ -276,9 +276,18 @@ def _first_noise(told: Doings, residual_m: Array, covariance: Array, weight: Arr
     if found is not None:
         covariance, source, freedom = _rescaled(covariance, found.variance), "replicates", found.freedom
         beyond = found.variance if stated else 1.0
+    elif told.seen.calibrated is not None:
+        covariance = _as_calibrated_with(told.seen.calibrated.noise_m, covariance)
     floor = np.trace(covariance, axis1=1, axis2=2)
     none = np.zeros(0, dtype=int)
     return NoiseFound(covariance, floor, source, stated, freedom, np.inf, 0.0, 1.0, beyond, none, weight)
+
+
+def _as_calibrated_with(noise_m: float, covariance: Array) -> Array:
+    """Stated covariances, or what a calibration found beside the statement: how well the arm comes back to a place."""
+    stated_m2 = np.trace(covariance, axis1=1, axis2=2).mean() / 3
+    more = np.isfinite(noise_m) and noise_m**2 > stated_m2
+    return _rescaled(covariance, noise_m**2 / stated_m2) if more else covariance
 
 
 def _rescaled(covariance: Array, variance: float) -> Array:

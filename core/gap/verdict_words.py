@@ -8,7 +8,7 @@ from core.wording import fixed
 
 FLOORS = {
     "repeats": "as repeated measurements scatter",
-    "sigma": "by the noise of the instrument; no measurement was repeated to check it",
+    "sigma": "as stated of the instrument, or found by a calibration; no measurement was repeated to check it",
     "unknown": "estimated from what no model explains; nothing was repeated",
 }
 

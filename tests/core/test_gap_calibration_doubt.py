@@ -19,7 +19,7 @@ from core.gap.experiments import blocks_for, observe_block
 from core.gap.ledger import ledger
 from core.gap.observations import Observations, observe
 from core.gap.place_words import CALIBRATION
-from core.gap.result import Verdict
+from core.gap.result import Place, Verdict
 from core.gap.sim import Sim
 from core.gap.verdict_words import verdict_sentence
 from core.geometry import Array
@@ -139,3 +139,13 @@ def test_the_corrected_sim_moves_the_calibration_as_far_as_it_was_moved() -> Non
     still = replace(found.corrected, doubt=np.zeros_like(found.corrected.doubt))
     _, unmoved = still.points_m(found.campaign)
     assert np.sqrt(np.mean(np.sum((seen.point_m - unmoved) ** 2, axis=1))) > 2 * left
+
+
+def test_the_floor_is_at_least_the_noise_that_the_calibration_found() -> None:
+    """The instrument's statement knows nothing of how well the arm comes back to a place."""
+    noise_m = calibrated_arm(calibrate(simulated(20))).noise_m
+    found = diagnosed(25, "backlash:2:0.2deg")
+    assert found.noise.stated_m < 0.6 * noise_m
+    assert found.noise.floor_rms_m == pytest.approx(np.sqrt(3) * noise_m, rel=0.05)
+    assert found.causes[0].place.same_as(Place("backlash", joint=2))
+    assert found.causes[0].probability > 0.5
