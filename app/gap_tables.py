@@ -16,6 +16,8 @@ MOST_PARAMETERS = 4
 """Of one cause, in a cell."""
 NOWHERE = "–"
 NOT_AT_ALL = "∞"
+SAME = 0.01
+"""Gaps that differ by less are called the same."""
 SOURCES = {
     "replicates": "repeated measurements",
     "residuals": "what a flexible fit leaves; nothing was repeated",
@@ -158,6 +160,8 @@ def _holds(before: float, after: float) -> Cell:
     """Whether the causes make the other data better too."""
     if not (math.isfinite(before) and math.isfinite(after)):
         return Cell("")
+    if abs(after - before) <= SAME * before:
+        return Cell("the same")
     return Cell("better") if after < before else Cell("worse", mark="significant")
 
 

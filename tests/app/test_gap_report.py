@@ -15,9 +15,10 @@ from app.figures.gap_vectors import gap_vectors_figure, magnification
 from app.figures.gap_where import gap_records_figure, gap_shares_figure
 from app.figures.reliability import reliability_figure
 from app.gap_report import gap_html, gap_page
-from app.gap_tables import cause_parameters, probability_words, shown_limits
-from core.gap.ledger import difference_with, switches
-from core.gap.result import DetectionLimit, Parameter, Place
+from app.gap_tables import cause_parameters, probability_words, shown_limits, shown_transfers
+from core.gap.ledger import difference_with, ledger, switches
+from core.gap.place_words import CALIBRATION
+from core.gap.result import DetectionLimit, Parameter, Place, Transfer
 from core.gap.verdict_words import verdict_sentence
 from core.wording import typeset
 from tests.app.report_cases import HOSTILE
@@ -226,3 +227,26 @@ def test_limits_of_couplings_stand_under_the_joint_that_follows() -> None:
 )
 def test_no_cause_is_said_to_be_impossible_or_certain(probability: float, words: str) -> None:
     assert probability_words(probability) == words
+
+
+@pytest.mark.parametrize(
+    ("after", "said"), [(2.6e-4, "better"), (9.45e-4, "the same"), (9.5e-4, "the same"), (9.8e-4, "worse")]
+)
+def test_whether_causes_hold_elsewhere_is_said_in_a_word(after: float, said: str) -> None:
+    report = replace(gap_reports.explained(), transfers=(Transfer("sweeps", "poses", 36, 9.5e-4, after),))
+    ((row,),) = shown_transfers(report).groups
+    assert row[-1].text == said
+
+
+def test_what_a_calibration_leaves_uncertain_has_a_step_a_line_and_a_number_of_its_own() -> None:
+    plain = gap_reports.explained()
+    report = replace(plain, within_calibration_rms_m=0.6 * plain.gap_rms_m)
+    names = list(gap_steps_figure(report).data[0].y)
+    assert len(names) == len(gap_steps_figure(plain).data[0].y) + 1
+    assert CALIBRATION.split()[-1] in names[1]
+    assert ledger(report)[0].words == CALIBRATION
+    text = gap_html(report)
+    assert "Calibration moved" in text
+    assert CALIBRATION in verdict_sentence(report)
+    assert "Calibration moved" not in gap_html(plain)
+    assert "Calibration moved" not in gap_html(replace(plain, within_calibration_rms_m=0.99 * plain.gap_rms_m))
