@@ -25,6 +25,7 @@ from core.gap.posterior import AT_BEST, BESIDE_UNKNOWN, adequate, floats, rivals
 from core.gap.problem import Problem
 from core.gap.reliability import reliability
 from core.gap.result import (
+    NEAR_FLOOR,
     Cause,
     Cell,
     LeftTest,
@@ -270,8 +271,8 @@ class Findings:
         score[np.isin(groups, given.groups)] = -np.inf
         most = float(score.max())
         p_value = float(min(1.0, 0.1 * np.exp(-(most - (a.threshold - 3.0)))))
-        shares = abs(self.left_m2 - self.floor_m2) < 0.02 * max(self.gap_m2 - self.floor_m2, 0.0) + 0.05 * self.floor_m2
-        noise_like = (p_value > NOISE_LIKE or bool(shares)) and a.noise.excess == 1
+        down_to_it = self.left_m2 <= NEAR_FLOOR**2 * self.floor_m2
+        noise_like = (p_value > NOISE_LIKE or down_to_it) and a.noise.excess == 1
         return LeftTest("largest evidence left for any cause", p_value, noise_like)
 
     @cached_property

@@ -25,6 +25,8 @@ UNKNOWN = "unknown"
 """The effect of a cause that is located, not named."""
 
 
+NEAR_FLOOR = 1.25
+"""Floors that count as down to the noise, whatever small things the evidence sees in them."""
 NOTABLY = 0.95
 """Of the gap: a calibration that leaves less of it takes part in it."""
 

@@ -3,7 +3,7 @@
 import math
 
 from core.gap.place_words import CALIBRATION, cause_words, either_of, listed
-from core.gap.result import UNKNOWN, Cause, GapReport, Rivals, Verdict
+from core.gap.result import NEAR_FLOOR, UNKNOWN, Cause, GapReport, Rivals, Verdict
 from core.wording import fixed
 
 FLOORS = {
@@ -12,8 +12,6 @@ FLOORS = {
     "unknown": "estimated from what no model explains; nothing was repeated",
 }
 
-
-NEAR_FLOOR = 1.25
 MOST_NAMED = 3
 """Causes that one sentence can hold."""
 
