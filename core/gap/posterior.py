@@ -12,7 +12,7 @@ from scipy.special import expit
 from core.gap.effects.candidate import motors
 from core.gap.evidence import Chosen, joined, without
 from core.gap.open_set import AT_FLOOR, LOCALLY, Judge, Stand, chosen_of, is_slow
-from core.gap.plausible import mostly_idle, own
+from core.gap.plausible import AGAINST, mostly_idle, own, plausible
 from core.gap.result import Place
 from core.geometry import Array
 
@@ -25,14 +25,15 @@ NAMED_AT, NAMED_WIDTH = LOCALLY, 0.012
 CLOSES_AT, CLOSES_WIDTH = 0.82, 0.03
 """Share of the gap beyond the floor that names close together at which they are as likely wrong as right: where they
 leave more, something without a name is at work and they stand in for it. From simulated worlds with known causes."""
-LEAST, MOST = 0.1, 0.97
+LEAST, MOST = 0.4, 0.98
 """However badly or well names close, so often they are right in those worlds."""
 BESIDE_UNKNOWN = 0.4
 """How much less a name is worth that is told after something without a name."""
 AT_BEST, LIKE_LOST_MOTION = 0.5, frozenset({"mesh", "quantisation"})
 """Where one joint alone moves, everything is some function of it; where nobody wrote down how points were reached, lost
-motion looks like ripple; anything smooth looks like a mesh of few teeth; where a form's numbers are mostly idle, a
-plainer one would do: no such name is likelier than not."""
+motion looks like ripple; anything smooth looks like a mesh of few teeth: no such name is likelier than not."""
+IDLE_AT_BEST = 0.8
+"""Where a form's numbers are mostly idle, a plainer one would do."""
 TWIN_ODDS = 0.05
 """A candidate at least so probable beside the named one is its twin."""
 
@@ -66,6 +67,13 @@ def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, floa
     places.append(NO_CAUSE)
     rough = np.array([LOST_MOTION_ERROR if _both_lose_motion(stand.place, one) else FORM_ERROR for one in places])
     weight = np.exp(_odds(evidence, wide, mine, rough))
+    # A name whose sign was foretold has put all its hope there.
+    weight[[place.effect in AGAINST for place in places]] *= 2.0
+    for k, group in enumerate(best):
+        # Another name that fits as well, by numbers that its effect never has, is no rival.
+        if k != mine and weight[k] >= TWIN_ODDS * weight[mine]:
+            one = own(judge.problem, judge.evidence, int(named[group]), float(gains.size[group]), known)
+            weight[k] *= plausible(one, judge.problem.sim.seen.chain)
     order = np.argsort(-weight, kind="stable")
     return [(places[k], float(weight[k] / weight.sum())) for k in order]
 
@@ -135,7 +143,9 @@ def has_name(judge: Judge, stand: Stand, others: Chosen) -> float:
     told, most = judge.problem.doings, 1.0
     slow = is_slow(judge.problem.candidates[stand.groups[0]])
     unlogged = stand.place.effect in LIKE_LOST_MOTION and not told.past.complete
-    if len(motors(told)) < 2 or unlogged or slow or free:
+    if free:
+        most = IDLE_AT_BEST
+    if len(motors(told)) < 2 or unlogged or slow:
         most = AT_BEST
     return most * float(expit((stand.local - NAMED_AT) / NAMED_WIDTH))
 
