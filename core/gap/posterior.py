@@ -70,8 +70,10 @@ def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, floa
     # A name whose sign was foretold has put all its hope there.
     weight[[place.effect in AGAINST for place in places]] *= 2.0
     for k, group in enumerate(best):
-        # Another name that fits as well, by numbers that its effect never has, is no rival.
-        if k != mine and weight[k] >= TWIN_ODDS * weight[mine]:
+        # Another name that fits as well, by numbers that its effect never has, is no rival; but play and hysteresis
+        # differ soon after the motor turned round alone, where there may be no point.
+        near = k != mine and weight[k] >= TWIN_ODDS * weight[mine]
+        if near and not _both_lose_motion(stand.place, places[k]):
             one = own(judge.problem, judge.evidence, int(named[group]), float(gains.size[group]), known)
             weight[k] *= plausible(one, judge.problem.sim.seen.chain)
     order = np.argsort(-weight, kind="stable")

@@ -8,6 +8,7 @@ import pytest
 from gap_cells import crane_cell, measured
 from scipy.signal import lfilter
 
+from core.gap import posterior
 from core.gap.analysis import analyse
 from core.gap.diagnosis import Findings, diagnose
 from core.gap.evidence import NOTHING, Chosen
@@ -86,6 +87,18 @@ def test_what_is_true_beside_a_cause_does_not_speak_against_it() -> None:
     assert gains[mesh].max() > judge.evidence.gains(np.array(scale.groups)).evidence[0] + 100
     said = {(place.effect, place.joint): p for place, p in rivals(judge, scale, NOTHING)}
     assert said[("mesh", 3)] < 1e-6 < 0.1 < said[("scale", None)]
+
+
+def test_a_rival_by_numbers_that_its_effect_never_has_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = observe(measured(crane_cell(), "payload:-:2kg"))
+    found = Findings(analyse(seen), seen, blocks(seen), told=False)
+    (stand,) = found.named
+    before = {(place.effect, place.joint): p for place, p in rivals(found.judge, stand, NOTHING)}
+    assert before[("ratio", 2)] > 0.1
+    monkeypatch.setattr(posterior, "plausible", lambda one, chain: one.candidate.place.effect != "ratio")
+    after = {(place.effect, place.joint): p for place, p in rivals(found.judge, stand, NOTHING)}
+    assert after[("ratio", 2)] == 0.0
+    assert after[("payload", None)] > before[("payload", None)]
 
 
 def test_a_great_shift_between_two_moments_of_the_search_is_found_to_the_record() -> None:
