@@ -11,7 +11,7 @@ from scipy.special import expit
 
 from core.gap.effects.candidate import motors
 from core.gap.evidence import Chosen, joined, without
-from core.gap.open_set import AT_FLOOR, LOCALLY, Judge, Stand, chosen_of, is_slow
+from core.gap.open_set import AT_FLOOR, Judge, Stand, chosen_of, is_slow
 from core.gap.plausible import AGAINST, mostly_idle, own, plausible
 from core.gap.result import Place
 from core.geometry import Array
@@ -21,7 +21,7 @@ FORM_ERROR = 0.002
 """Share of the evidence that rough forms of effects can be wrong by."""
 LOST_MOTION, LOST_MOTION_ERROR = {"backlash", "hysteresis"}, 0.04
 """The same between play and hysteresis of a joint, of which no form says how it floats."""
-NAMED_AT, NAMED_WIDTH = LOCALLY, 0.012
+NAMED_AT, NAMED_WIDTH = 0.93, 0.012
 CLOSES_AT, CLOSES_WIDTH = 0.82, 0.03
 """Share of the gap beyond the floor that names close together at which they are as likely wrong as right: where they
 leave more, something without a name is at work and they stand in for it. From simulated worlds with known causes."""
