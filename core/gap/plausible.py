@@ -128,6 +128,16 @@ def _weightless(one: Own) -> bool:
     return abs(one.values.get(f"own_weight_{most}", 0.0) + give) < UNWEIGHED * abs(give)
 
 
+def gives_at_one_joint(one: Own) -> bool:
+    """Whether a load that nobody wrote down shows at one joint alone, which gives way as it would under any load."""
+    if one.candidate.place.effect != "payload":
+        return False
+    gives = np.array([name.startswith("give_of_joint") for name in one.candidate.names])
+    moved = one.numbers**2 * np.diag(one.square)
+    most = int(np.argmax(np.where(gives, moved, -1.0)))
+    return bool(one.numbers[most] > 0 and moved[most] > MERELY * moved.sum())
+
+
 def _cancels(one: Own) -> bool:
     """Whether the numbers move points far less than random ones of their size would."""
     draws = np.random.default_rng(SEED).standard_normal((DRAWS, len(one.numbers)))

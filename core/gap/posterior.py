@@ -12,7 +12,7 @@ from scipy.special import expit
 from core.gap.effects.candidate import motors
 from core.gap.evidence import Chosen, joined, without
 from core.gap.open_set import AT_FLOOR, Judge, Stand, chosen_of, is_slow
-from core.gap.plausible import AGAINST, mostly_idle, own, plausible
+from core.gap.plausible import AGAINST, gives_at_one_joint, mostly_idle, own, plausible
 from core.gap.result import Place
 from core.geometry import Array
 
@@ -31,7 +31,8 @@ BESIDE_UNKNOWN = 0.4
 """How much less a name is worth that is told after something without a name."""
 AT_BEST, LIKE_LOST_MOTION = 0.5, frozenset({"mesh", "quantisation"})
 """Where one joint alone moves, everything is some function of it; where nobody wrote down how points were reached, lost
-motion looks like ripple; anything smooth looks like a mesh of few teeth: no such name is likelier than not."""
+motion looks like ripple; anything smooth looks like a mesh of few teeth; a load under which one joint alone gives way
+looks like what that joint does under any: no such name is likelier than not."""
 IDLE_AT_BEST = 0.8
 """Where a form's numbers are mostly idle, a plainer one would do."""
 TWIN_ODDS = 0.05
@@ -141,13 +142,13 @@ def floats(judge: Judge, stand: Stand, named: Sequence[Stand]) -> bool:
 def has_name(judge: Judge, stand: Stand, others: Chosen) -> float:
     """Probability that some name of the library is right, from how much nameless functions would still add."""
     rest = without(joined(judge.given, others), stand.groups[:1])
-    free = mostly_idle(own(judge.problem, judge.evidence, stand.groups[0], stand.sizes[0], rest))
+    one = own(judge.problem, judge.evidence, stand.groups[0], stand.sizes[0], rest)
     told, most = judge.problem.doings, 1.0
     slow = is_slow(judge.problem.candidates[stand.groups[0]])
     unlogged = stand.place.effect in LIKE_LOST_MOTION and not told.past.complete
-    if free:
+    if mostly_idle(one):
         most = IDLE_AT_BEST
-    if len(motors(told)) < 2 or unlogged or slow:
+    if len(motors(told)) < 2 or unlogged or slow or gives_at_one_joint(one):
         most = AT_BEST
     return most * float(expit((stand.local - NAMED_AT) / NAMED_WIDTH))
 

@@ -11,7 +11,7 @@ from core.gap.analysis import Analysis, analyse
 from core.gap.effects.candidate import Candidate
 from core.gap.evidence import NOTHING
 from core.gap.observations import observe
-from core.gap.plausible import Own, mostly_idle, own, plausible
+from core.gap.plausible import Own, gives_at_one_joint, mostly_idle, own, plausible
 from core.gap.problem import Problem, pose_problem
 from core.gap.result import Place
 from core.geometry import Array
@@ -137,3 +137,17 @@ class TestIdle:
 
     def test_a_single_number_is_never_idle(self) -> None:
         assert not mostly_idle(self.form(np.array([0.01])))
+
+
+@pytest.mark.parametrize(
+    ("effect", "second", "third", "alone"),
+    [
+        ("payload", 3.0, 0.1, True),
+        ("payload", 3.0, 2.0, False),
+        ("payload", -3.0, 0.1, False),
+        ("ratio", 3.0, 0.1, False),
+    ],
+)
+def test_a_load_under_which_one_joint_alone_gives_way(effect: str, second: float, third: float, alone: bool) -> None:
+    names = ("give_of_joint_2_rad_per_nm", "give_of_joint_3_rad_per_nm")
+    assert gives_at_one_joint(form_of(np.array([second, third]), effect, names)) == alone
