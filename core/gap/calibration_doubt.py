@@ -26,32 +26,34 @@ def doubt_columns(seen: Observations) -> list[Column]:
     arm = seen.calibrated
     if arm is None or arm.covariance is None:
         return []
-    moves = _moves(arm, seen)
-    slots = list(dict.fromkeys(slot for move in moves for slot, _ in move))
-    by_parameter = np.zeros((len(slots), len(moves), seen.count))
-    for p, move in enumerate(moves):
-        for slot, feature in move:
-            by_parameter[slots.index(slot), p] += feature
     roots = arm.covariance.roots()
-    together = np.einsum("spm,pk->ksm", by_parameter, roots, optimize=True)
-    return [_column(slots, features) for features in together]
+    steady: dict[Slot, Array] = {}
+    varying: dict[Slot, Array] = {}
+    for move, root in zip(_moves(arm, seen), roots, strict=True):
+        for slot, feature in move:
+            if isinstance(feature, float):
+                steady[slot] = steady.get(slot, 0.0) + feature * root
+            else:
+                varying[slot] = varying.get(slot, 0.0) + np.outer(root, feature)
+    return [_column(k, steady, varying, seen.count) for k in range(roots.shape[1])]
 
 
-def _column(slots: list[Slot], features: Array) -> Column:
-    """What moves notably; of what moves nothing the first slot."""
-    moved = np.flatnonzero(np.abs(features).max(axis=1) > LEAST_MOTION)
-    return [(slots[k], features[k]) for k in (moved if len(moved) else [0])]
+def _column(k: int, steady: dict[Slot, Array], varying: dict[Slot, Array], count: int) -> Column:
+    """What one combination moves notably; of what moves nothing the first slot."""
+    out: Column = [(slot, np.broadcast_to(by_root[k], count)) for slot, by_root in steady.items()]
+    out += [(slot, by_root[k]) for slot, by_root in varying.items()]
+    return [(slot, feature) for slot, feature in out if np.abs(feature).max() > LEAST_MOTION] or out[:1]
 
 
-def _moves(arm: CalibratedArm, seen: Observations) -> list[Column]:
-    """What one unit of each parameter moves."""
+def _moves(arm: CalibratedArm, seen: Observations) -> list[list[tuple[Slot, float | Array]]]:
+    """What one unit of each parameter moves: by the same at every point, or by a feature, (m,)."""
     twists = _frame_twists(arm)
     active = arm.drives.active(seen.commanded)
-    out = []
+    out: list[list[tuple[Slot, float | Array]]] = []
     for parameter in arm.covariance.parameters:
         if parameter.part == FRAME:
             twist = twists[parameter.number - 1, PARAMETERS.index(parameter.name)]
-            out.append([(Slot(Part.AXIS, parameter.number, k), np.full(seen.count, twist[k])) for k in range(6)])
+            out.append([(Slot(Part.AXIS, parameter.number, k), float(twist[k])) for k in range(6)])
         elif parameter.part == COUPLING:
             out.append([(Slot(Part.JOINT, parameter.number - 1), _by_coupling(arm, parameter, active))])
         else:

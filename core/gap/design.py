@@ -30,13 +30,26 @@ class Design:
         return list(dict.fromkeys(slot for column in self.columns for slot, _ in column))
 
     @cached_property
+    def _number(self) -> dict[Slot, int]:
+        return {slot: k for k, slot in enumerate(self._slots)}
+
+    @cached_property
     def _terms(self) -> tuple[np.ndarray, np.ndarray, Array]:
-        """Slot and column of every term, (t,), and its feature, (t, m)."""
-        number = {slot: k for k, slot in enumerate(self._slots)}
-        slot = [number[s] for column in self.columns for s, _ in column]
-        of = [c for c, column in enumerate(self.columns) for _ in column]
-        feature = np.stack([f * self.scale[c] for c, column in enumerate(self.columns) for _, f in column])
-        return np.array(slot), np.array(of), feature
+        """Slot and column of every term that is not steady, (t,), and its feature, (t, m)."""
+        terms = [(s, c, f) for c, column in enumerate(self.columns) for s, f in column if not is_steady(f)]
+        feature = np.array([f * self.scale[c] for _, c, f in terms]).reshape(len(terms), self.sim.seen.count)
+        return np.array([self._number[s] for s, _, _ in terms], int), np.array([c for _, c, _ in terms], int), feature
+
+    @cached_property
+    def _steady(self) -> tuple[np.ndarray, Array]:
+        """Columns with steady terms, (c,), and what these have of every slot, (c, slots)."""
+        columns = [c for c, column in enumerate(self.columns) if any(is_steady(f) for _, f in column)]
+        share = np.zeros((len(columns), len(self._slots)))
+        for row, c in enumerate(columns):
+            for slot, feature in self.columns[c]:
+                if is_steady(feature):
+                    share[row, self._number[slot]] += feature[0] * self.scale[c]
+        return np.array(columns, dtype=int), share
 
     def fields(self) -> Array:
         """How the points answer to every small motion that a column makes, (m, 3, slots)."""
@@ -45,11 +58,17 @@ class Design:
     def spread(self, fields: Array) -> Array:
         """The columns, (p, 3, m), with answers of the points to small motions, (slots, 3, m)."""
         slot, of, feature = self._terms
-        first = np.searchsorted(of, np.arange(self.count))
-        out = fields[slot[first]]
-        out *= feature[first][:, None]
+        columns, first = np.unique(of, return_index=True)
+        fields = np.ascontiguousarray(fields)
+        out = np.empty((self.count, *fields.shape[1:]))
+        out[columns] = fields[slot[first]]
+        out[columns] *= feature[first][:, None]
+        steady, share = self._steady
+        out[np.setdiff1d(steady, columns)] = 0.0
         for t in np.setdiff1d(np.arange(len(of)), first):
             out[of[t]] += fields[slot[t]] * feature[t]
+        if len(steady):
+            out[steady] += np.tensordot(share, fields, axes=1)
         return out
 
     def some(self, columns: Sequence[int] | np.ndarray) -> "Design":
@@ -67,6 +86,11 @@ class Design:
             for slot, feature in column:
                 out[slot] = out.get(slot, 0.0) + feature * (scale * number)
         return out
+
+
+def is_steady(feature: Array) -> bool:
+    """Whether a feature is one number, spread over all points without a copy of it at each."""
+    return feature.strides == (0,) and feature.size > 0
 
 
 def candidate_columns(candidates: Sequence[Candidate], doings: Doings) -> tuple[list[Column], Array, list[slice]]:
