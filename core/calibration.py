@@ -17,7 +17,7 @@ from core.findings import Finding, findings
 from core.geometry import Array, invert
 from core.joint_by_joint import joint_by_joint
 from core.measurements import Campaign
-from core.phi_convention import Convention, convention_for
+from core.phi_convention import Convention, convention_of
 from core.phi_model import PhiModel, frames, from_axes
 from core.refinement import Refinement, refine
 from core.robot import Robot
@@ -118,7 +118,7 @@ def nominal_frames(robot: Robot, found: SweepFits) -> tuple[Convention | None, P
     if len(found.swept) < robot.joint_count or robot.joint_count < 2:
         return None, None
     lines = robot.axes_at_zero()
-    convention = convention_for(lines, robot.sliding, robot.phi_rad, y_reference=robot.base_transform[:3, 1])
+    convention = convention_of(robot)
     return convention, from_axes(lines, convention)[1]
 
 

@@ -18,7 +18,7 @@ from core.geometry import Array
 from core.json_records import JsonRecord, read_json
 from core.motion_forms import MotionForm, MotionFunction, coupling_form, transmission_form
 from core.parameter_covariance import COUPLING, FRAME, TRANSMISSION, Parameter, ParameterCovariance
-from core.phi_convention import Convention, convention_for
+from core.phi_convention import Convention, convention_of
 from core.phi_model import PARAMETERS, PhiModel, axes, from_axes
 from core.robot import Robot
 from core.robot_json import robot_of_record, transform_of
@@ -44,7 +44,7 @@ def read_calibration(path: Path | str) -> CalibratedArm:
     if not frames or "base_to_instrument" not in top:
         raise top.failed("has no frames: the calibrated geometry needs a sweep of every joint")
     lines = nominal.axes_at_zero()
-    convention = convention_for(lines, nominal.sliding, nominal.phi_rad, y_reference=nominal.base_transform[:3, 1])
+    convention = convention_of(nominal)
     geometry = _geometry(top, frames, nominal, convention)
     estimate = _estimate(top, nominal, geometry)
     chain = calibrated_robot(nominal, convention, from_axes(lines, convention)[1], estimate)

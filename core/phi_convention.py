@@ -20,6 +20,7 @@ import numpy as np
 from core.errors import RobotError
 from core.geometry import Array, Line, common_normal, cross, transform
 from core.phi_transforms import link_to, link_transform, phi_transform
+from core.robot import Robot
 
 PARALLEL_SINE = np.sin(np.deg2rad(10.0))
 """Axes closer to parallel than this are treated as parallel by design: their common normal is ill defined."""
@@ -111,6 +112,15 @@ def convention_for(
     if phi_rad is not None:
         return replace(rule, phi_rad=np.concatenate([[np.pi / 2], np.asarray(phi_rad, dtype=float)[1:]]))
     return _choose_phi(lines, rule)
+
+
+def convention_of(robot: Robot) -> Convention:
+    """The rule for the frames of a robot's phi-model, by its drawing.
+
+    Raises:
+        RobotError: as ``convention_for``.
+    """
+    return convention_for(robot.axes_at_zero(), robot.sliding, robot.phi_rad, y_reference=robot.base_transform[:3, 1])
 
 
 def base_frame(lines: tuple[Line, ...], convention: Convention) -> Array:

@@ -14,7 +14,7 @@ from core.gap.sim import Part, Slot
 from core.geometry import Array, cross
 from core.kinematics import link_frames
 from core.parameter_covariance import COUPLING, FRAME, Parameter
-from core.phi_convention import convention_for
+from core.phi_convention import convention_of
 from core.phi_model import PARAMETERS, from_axes, parameter_twists
 
 LEAST_MOTION = 1e-9
@@ -64,9 +64,7 @@ def _moves(arm: CalibratedArm, seen: Observations) -> list[list[tuple[Slot, floa
 def _frame_twists(arm: CalibratedArm) -> Array:
     """Turn and shift of what follows a frame by each of its parameters, in the frame before its joint, (n-1, 4, 6)."""
     nominal, robot = arm.nominal, arm.robot
-    convention = convention_for(
-        nominal.axes_at_zero(), nominal.sliding, nominal.phi_rad, y_reference=nominal.base_transform[:3, 1]
-    )
+    convention = convention_of(nominal)
     base, model = from_axes(robot.axes_at_zero(), convention)
     # At zero displacement a frame is the same before and after its own joint moves.
     before = link_frames(robot, np.zeros((1, robot.joint_count)))[0, 1:-1]

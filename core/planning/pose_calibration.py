@@ -22,7 +22,7 @@ from core.kinematics import active_commands, link_frames, nominal_net
 from core.measurements import Campaign
 from core.motion_forms import MotionFunction
 from core.noise import Noise, is_stated
-from core.phi_convention import convention_for
+from core.phi_convention import convention_of
 from core.phi_model import from_axes
 from core.phi_uncertainty import geometry_from_axes
 from core.planning.information import fitted
@@ -139,7 +139,7 @@ def _assembled(
 ) -> tuple[CalibratedArm, ArmEstimate]:
     robot = campaign.robot
     lines = robot.axes_at_zero()
-    convention = convention_for(lines, robot.sliding, robot.phi_rad, y_reference=robot.base_transform[:3, 1])
+    convention = convention_of(robot)
     nominal = from_axes(lines, convention)[1]
     drives = _function_fits(state.transmissions, problem.layout.transmissions, solved)
     covariance = axis_covariance(problem, solved.covariance, robot.joint_count)

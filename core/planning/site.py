@@ -11,7 +11,7 @@ from core.errors import InputError
 from core.geometry import Array, apply
 from core.kinematics import active_commands, link_frames
 from core.measurements import Target
-from core.phi_convention import Convention, convention_for
+from core.phi_convention import Convention, convention_of
 from core.planning.sight import Sight
 from core.robot import Robot
 
@@ -106,9 +106,7 @@ class Site:
     @cached_property
     def convention(self) -> Convention:
         """Where the frames of the phi-model go."""
-        robot = self.robot
-        lines = robot.axes_at_zero()
-        return convention_for(lines, robot.sliding, robot.phi_rad, y_reference=robot.base_transform[:3, 1])
+        return convention_of(self.robot)
 
     @cached_property
     def layout(self) -> Layout:

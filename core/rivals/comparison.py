@@ -17,8 +17,8 @@ from core.compensation import compensate
 from core.errors import InputError, TrueaxisError
 from core.geometry import Array, Line
 from core.measurements import Campaign
+from core.phi_convention import convention_of
 from core.phi_model import from_axes, near
-from core.rivals.identified import convention_of
 from core.rivals.observed import Drives
 from core.rivals.problems import Repeatability
 from core.rotations import vectors_of_rotations

@@ -10,15 +10,8 @@ from core.calibrated_arm import CalibratedArm, assembled_arm
 from core.drives import offsets
 from core.estimate import ArmEstimate, Geometry
 from core.measurements import Campaign
-from core.phi_convention import Convention, convention_for
+from core.phi_convention import convention_of
 from core.phi_model import PhiModel, from_axes, near
-from core.robot import Robot
-
-
-def convention_of(robot: Robot) -> Convention:
-    """The rule for the frames of a robot's phi-model."""
-    lines = robot.axes_at_zero()
-    return convention_for(lines, robot.sliding, robot.phi_rad, y_reference=robot.base_transform[:3, 1])
 
 
 def arm_of(state: ArmState, campaign: Campaign) -> Arm:

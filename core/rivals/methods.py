@@ -11,12 +11,13 @@ from core.calibration import calibrate, nominal_frames
 from core.driven_robot import nominal_driven
 from core.joint_by_joint import joint_by_joint
 from core.measurements import Campaign
+from core.phi_convention import convention_of
 from core.rivals.aggregate import linear_least_squares, nonlinear_least_squares
 from core.rivals.chain_parameters import PhiParameters
 from core.rivals.circle_point import commanded_rotations, plane_and_circle
 from core.rivals.comparison import Data, Found, Method, Trial
 from core.rivals.denavit_hartenberg import DhParameters
-from core.rivals.identified import arm_of, calibrated_arm_of, convention_of
+from core.rivals.identified import arm_of, calibrated_arm_of
 from core.rivals.kalman import kalman_filter
 from core.rivals.observed import Drives
 from core.rivals.problems import Problem, point_problem, pose_problem

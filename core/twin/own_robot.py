@@ -15,7 +15,7 @@ from core.geometry import Array, Line, invert, perpendicular_basis, rotation_abo
 from core.kinematics import link_frames
 from core.measurements import Instrument, Target
 from core.motion_forms import MotionForm, MotionFunction, coupling_form, transmission_form
-from core.phi_convention import convention_for
+from core.phi_convention import convention_of
 from core.phi_model import PhiModel, frames, from_axes, near
 from core.robot import Coupling, Joint, JointKind, Robot
 from core.twin.cell import Cell, Truth, attached
@@ -70,7 +70,7 @@ def own_cell(
     """
     rng = np.random.default_rng(seed)
     nominal_lines = robot.axes_at_zero()
-    rule = convention_for(nominal_lines, robot.sliding, robot.phi_rad, y_reference=robot.base_transform[:3, 1])
+    rule = convention_of(robot)
     placed = _base(robot)
     nominal = from_axes(nominal_lines, rule)[1]
     base, phi = from_axes(tuple(_off(line, rng).moved(placed) for line in nominal_lines), rule)

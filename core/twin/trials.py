@@ -10,6 +10,7 @@ from core.arm_jacobian import ArmState
 from core.geometry import Array, invert
 from core.kinematics import active_commands
 from core.measurements import SWEEP, Campaign
+from core.phi_convention import convention_of
 from core.phi_model import from_axes
 from core.planning.expected_error import mean_lengths, required
 from core.planning.information import information_of
@@ -30,7 +31,6 @@ from core.rivals.comparison import (
     Trial,
     compare,
 )
-from core.rivals.identified import convention_of
 from core.rivals.methods import OWN, all_methods
 from core.rivals.observed import Drives
 from core.rivals.problems import Repeatability

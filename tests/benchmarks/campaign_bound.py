@@ -14,7 +14,7 @@ from core.arm import Arm
 from core.drives import offsets
 from core.geometry import Array, Line, rotation_about
 from core.measurements import SWEEP, Campaign
-from core.phi_convention import convention_for
+from core.phi_convention import convention_of
 from core.phi_model import frames, from_axes
 from core.rotations import vectors_of_rotations
 from core.twin.campaign import simulate_campaign
@@ -139,9 +139,7 @@ class CampaignBound:
     def _tool(self, arm: Arm) -> Array:
         """The tool in the test poses, (12, 4, 4): it hangs on the last frame of the phi-model."""
         robot = self.cell.robot
-        convention = convention_for(
-            robot.axes_at_zero(), robot.sliding, robot.phi_rad, y_reference=robot.base_transform[:3, 1]
-        )
+        convention = convention_of(robot)
         base, model = from_axes(arm.axes, convention)
         tool = frames(model, np.zeros(robot.joint_count), base)[-1] @ robot.link_transforms[-1]
         return chain(arm.axes, robot.sliding, arm.net(self.commanded))[:, -1] @ tool

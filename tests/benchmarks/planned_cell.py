@@ -15,7 +15,7 @@ from core.calibration import calibrate
 from core.geometry import Array, apply, invert
 from core.kinematics import forward, link_frames
 from core.measurements import POSE, SWEEP, Campaign, Measurements, Target
-from core.phi_convention import convention_for
+from core.phi_convention import convention_of
 from core.phi_model import from_axes
 from core.planning.expected_error import ExpectedError
 from core.planning.pose_calibration import calibrate_on_poses
@@ -49,7 +49,7 @@ def drawn_site() -> Site:
     cell = irb_l6.cell()
     robot, pair = cell.robot, cell.instrument
     lines = robot.axes_at_zero()
-    convention = convention_for(lines, robot.sliding, robot.phi_rad, y_reference=robot.base_transform[:3, 1])
+    convention = convention_of(robot)
     base = cell.truth.base @ invert(from_axes(lines, convention)[0])
     at_rest = link_frames(robot, np.zeros((1, robot.joint_count)))[0]
     targets = tuple(

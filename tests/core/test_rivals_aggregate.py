@@ -8,6 +8,7 @@ from core.compensation import reached
 from core.errors import CampaignError
 from core.geometry import apply, invert
 from core.measurements import Campaign
+from core.phi_convention import convention_of
 from core.rivals.aggregate import (
     Solution,
     condition_of,
@@ -17,7 +18,7 @@ from core.rivals.aggregate import (
 )
 from core.rivals.chain_parameters import ChainParameters, PhiParameters
 from core.rivals.equations import PointEquations
-from core.rivals.identified import arm_of, calibrated_arm_of, convention_of, phi_model_of
+from core.rivals.identified import arm_of, calibrated_arm_of, phi_model_of
 from core.rivals.measured_poses import measured_poses
 from core.rivals.observed import Drives, observed_points
 from core.rivals.problems import Problem, Repeatability, point_problem, pose_problem

@@ -11,12 +11,12 @@ from core.arm_jacobian import ArmState, Observations, predict
 from core.driven_robot import nominal_couplings
 from core.geometry import Line
 from core.motion_forms import Direct, MotionFunction
+from core.phi_convention import convention_of as convention_of_robot
 from core.phi_model import PhiModel, axes
 from core.rivals.aggregate import ParameterProblem, condition_of, nonlinear_least_squares
 from core.rivals.chain_parameters import PhiParameters
 from core.rivals.denavit_hartenberg import DhParameters
 from core.rivals.equations import PointEquations
-from core.rivals.identified import convention_of as convention_of_robot
 from core.rivals.observed import Drives, layout_of
 from core.rivals.problems import Problem, Repeatability, point_problem
 from core.robot import Joint, JointKind, Robot

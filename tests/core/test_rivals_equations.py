@@ -5,10 +5,10 @@ import pytest
 from rival_cells import EXACT, HAND, cell, free_poses
 
 from core.geometry import line_distance
+from core.phi_convention import convention_of
 from core.rivals.aggregate import ParameterProblem
 from core.rivals.chain_parameters import PhiParameters
 from core.rivals.denavit_hartenberg import DhParameters
-from core.rivals.identified import convention_of
 from core.rivals.markers import frames_of, marker_moves, markers
 from core.rivals.observed import Drives
 from core.rivals.problems import Problem, Repeatability, point_problem, pose_problem
