@@ -37,8 +37,9 @@ STRAY = 2.5
 FAR_LEFT, GEOMETRY_CLOSES, GEOMETRY_STAYS = 2.0, 0.6, 0.9
 """That is said where causes alone leave so many times the floor, and geometry with causes at most such a part of what
 they leave beyond it (mean squares); and stays so in later passes."""
-NULL_QUANTILE, NULL_MARGIN = 0.9, 3.0
-"""Of the largest evidence that noise alone makes; beyond a quantile it falls off as exp(-x)."""
+NULL_QUANTILE, NULL_MARGIN = 0.9, 5.0
+"""Of the largest evidence that noise alone makes; beyond a quantile it falls off as exp(-x). What a calibration leaves
+of geometry makes more than noise alone."""
 MOST_FLEXIBLE, MOST_SPENT = 4, 0.08
 """Nameless functions that a flexible fit takes, none with more columns than such a share of the components."""
 PASSES = 3
@@ -510,7 +511,8 @@ def _learned_noise(told: Doings, problem: Problem, spent: float, left: Array, fi
         repeated = again.variance / max(1.0 - memory**again.lag, 0.05)
         source, excess = "replicates", variance / max(repeated, 1e-300)
         spread = np.sqrt(2 / again.freedom + 2 / freedom)
-        if np.log(excess) > max(CHANCE * spread, LEAST_EXCESS):
+        # What repeats soon after each other tell of noise with a memory hangs on the memory, which is estimated too.
+        if np.log(excess) > max(CHANCE * spread, LEAST_EXCESS * (1 + memory)):
             floor = np.trace(_rescaled(first.covariance_m2, repeated), axis1=1, axis2=2)
         else:
             excess, freedom = 1.0, freedom + again.freedom

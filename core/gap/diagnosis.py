@@ -11,7 +11,7 @@ import numpy as np
 from core.calibrated_arm import CalibratedArm
 from core.errors import CampaignError
 from core.gap.advice import advice
-from core.gap.analysis import Analysis, Progress, analyse
+from core.gap.analysis import NULL_MARGIN, NULL_QUANTILE, Analysis, Progress, analyse
 from core.gap.corrected import CorrectedSim, Diagnosis
 from core.gap.detection import detection_limits
 from core.gap.effects.candidate import Candidate
@@ -270,7 +270,8 @@ class Findings:
         score = a.evidence.gains(groups, given).evidence - a.problem.cost
         score[np.isin(groups, given.groups)] = -np.inf
         most = float(score.max())
-        p_value = float(min(1.0, 0.1 * np.exp(-(most - (a.threshold - 3.0)))))
+        beyond = most - (a.threshold - NULL_MARGIN)
+        p_value = float(min(1.0, (1 - NULL_QUANTILE) * np.exp(-beyond)))
         down_to_it = self.left_m2 <= NEAR_FLOOR**2 * self.floor_m2
         noise_like = (p_value > NOISE_LIKE or down_to_it) and a.noise.excess == 1
         return LeftTest("largest evidence left for any cause", p_value, noise_like)
