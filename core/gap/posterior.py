@@ -60,7 +60,7 @@ def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, floa
     mine = _index(places, stand.place)
     # No cause at all is one more possibility, without evidence and without cost.
     evidence = np.append(score[best], 0.0)
-    for k in np.flatnonzero(evidence > evidence[mine]):
+    for k in np.flatnonzero(evidence[:-1] > evidence[mine]):
         beside = known.plus(int(named[best[k]]), float(gains.size[best[k]]))
         adds = judge.evidence.gains(named[best[mine : mine + 1]], beside).evidence[0]
         evidence[k] = min(evidence[k], evidence[mine] - adds + judge.problem.cost[named[best[mine]]])

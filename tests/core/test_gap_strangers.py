@@ -14,8 +14,9 @@ from core.gap.diagnosis import Findings, diagnose
 from core.gap.evidence import NOTHING, Chosen
 from core.gap.folds import blocks
 from core.gap.observations import observe
+from core.gap.open_set import Stand
 from core.gap.placement import place
-from core.gap.posterior import rivals
+from core.gap.posterior import NO_CAUSE, rivals
 from core.gap.result import UNKNOWN, Place
 from core.gap.sim import Part, Sim, Slot
 from core.geometry import Array
@@ -87,6 +88,19 @@ def test_what_is_true_beside_a_cause_does_not_speak_against_it() -> None:
     assert gains[mesh].max() > judge.evidence.gains(np.array(scale.groups)).evidence[0] + 100
     said = {(place.effect, place.joint): p for place, p in rivals(judge, scale, NOTHING)}
     assert said[("mesh", 3)] < 1e-6 < 0.1 < said[("scale", None)]
+
+
+def test_a_name_that_nothing_speaks_for_is_less_probable_than_no_cause() -> None:
+    seen = observe(measured(crane_cell(), "payload:-:2kg"))
+    found = Findings(analyse(seen), seen, blocks(seen), told=False)
+    judge, problem = found.judge, found.judge.problem
+    given = Chosen(found.worth.groups, found.worth.sizes)
+    gains = judge.evidence.gains(problem.named, given)
+    least = int(np.argmin(gains.evidence))
+    assert gains.evidence[least] < 0
+    place, size = problem.candidates[problem.named[least]].place, float(gains.size[least])
+    said = rivals(judge, Stand(place, (int(problem.named[least]),), (size,), 1.0), given)
+    assert said[0][0] is NO_CAUSE or said[0][1] > next(p for one, p in said if one.same_as(place))
 
 
 def test_a_rival_by_numbers_that_its_effect_never_has_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
