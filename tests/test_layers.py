@@ -11,8 +11,8 @@ ROOT = Path(__file__).parent.parent
 
 FOUNDATION = """
     core.version core.errors core.geometry core.rotations
-    core.phi_transforms core.phi_convention core.phi_model
-    core.robot core.kinematics core.measurements
+    core.phi_transforms core.robot core.phi_convention core.phi_model
+    core.kinematics core.measurements
 """
 FILES = """
     core.units core.input_files core.file_records core.toml_text core.toml_records core.text_table
@@ -23,7 +23,7 @@ FILES = """
 CALIBRATION = """
     core.theodolite core.noise core.axes core.displacement core.sweep_fits
     core.motion_forms core.arm core.function_fit core.drives core.transmission
-    core.estimate core.phi_uncertainty core.arm_jacobian core.coupling
+    core.parameter_covariance core.estimate core.phi_uncertainty core.arm_jacobian core.coupling
     core.walk_from_base core.joint_by_joint core.refinement_problem core.refined_curves core.refinement
     core.arc_needed core.live_sweep core.base_placement core.findings core.calibration
     core.solve_figures
