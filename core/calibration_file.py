@@ -17,9 +17,16 @@ from core.function_fit import FunctionFit
 from core.geometry import Array
 from core.json_records import JsonRecord, read_json
 from core.motion_forms import MotionForm, MotionFunction, coupling_form, transmission_form
-from core.parameter_covariance import COUPLING, FRAME, TRANSMISSION, Parameter, ParameterCovariance
+from core.parameter_covariance import (
+    COUPLING,
+    TRANSMISSION,
+    Parameter,
+    ParameterCovariance,
+    constants_of,
+    frame_parameters,
+)
 from core.phi_convention import Convention, convention_of
-from core.phi_model import PARAMETERS, PhiModel, axes, from_axes
+from core.phi_model import PhiModel, axes, from_axes
 from core.robot import Robot
 from core.robot_json import robot_of_record, transform_of
 from core.units import displacement_units, to_si
@@ -179,11 +186,10 @@ def _covariance(top: JsonRecord, estimate: ArmEstimate) -> ParameterCovariance |
 
 def _parameters(estimate: ArmEstimate) -> list[Parameter]:
     """Everything that a calibration can have estimated."""
-    n = estimate.arm.robot.joint_count
-    out = [Parameter(FRAME, i, name) for i in range(1, n) for name in PARAMETERS]
+    out = frame_parameters(estimate.arm.robot.joint_count)
     for part, fits in ((TRANSMISSION, estimate.transmissions), (COUPLING, estimate.couplings)):
         for joint, fit in enumerate(fits, 1):
-            out += [Parameter(part, joint, name) for name in (() if fit is None else fit.form.coefficient_names)]
+            out += [] if fit is None else constants_of(part, joint, fit.form)
     return out
 
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from core.errors import InputError
 from core.geometry import Array
+from core.motion_forms import MotionForm
+from core.phi_model import PARAMETERS
 
 FRAME, TRANSMISSION, COUPLING = "frame", "transmission", "coupling"
 LEAST = 1e-12
@@ -24,6 +26,16 @@ class Parameter:
 
     def __str__(self) -> str:
         return f"{self.part} {self.number} {self.name}"
+
+
+def frame_parameters(joints: int) -> list[Parameter]:
+    """Those of the phi-model of an arm, frame by frame."""
+    return [Parameter(FRAME, i, name) for i in range(1, joints) for name in PARAMETERS]
+
+
+def constants_of(part: str, number: int, form: MotionForm) -> list[Parameter]:
+    """Those of the function of one drive."""
+    return [Parameter(part, number, name) for name in form.coefficient_names]
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,9 +31,9 @@ from core.geometry import Array, cross
 from core.measurements import Campaign
 from core.motion_forms import MotionFunction
 from core.noise import Noise
-from core.parameter_covariance import COUPLING, FRAME, TRANSMISSION, Parameter, ParameterCovariance
+from core.parameter_covariance import COUPLING, TRANSMISSION, ParameterCovariance, constants_of, frame_parameters
 from core.phi_convention import Convention
-from core.phi_model import PARAMETERS, PhiModel
+from core.phi_model import PhiModel
 from core.phi_uncertainty import geometry_from_axes, parameters_by_axes
 from core.refined_curves import Seen, refined_motions, with_curves
 from core.refinement_problem import RefinementProblem, Solved
@@ -207,9 +207,9 @@ def _parameter_covariance(
     problem: RefinementProblem, state: ArmState, covariance: Array, convention: Convention, geometry: Geometry
 ) -> ParameterCovariance:
     """Axes carried over to the parameters of the phi-model, beside the constants of all functions."""
-    n, layout = len(state.axes), problem.layout
+    layout = problem.layout
     by_axes = parameters_by_axes(state.axes, geometry.base, geometry.model, convention)
-    parameters = [Parameter(FRAME, i, name) for i in range(1, n) for name in PARAMETERS]
+    parameters = frame_parameters(len(state.axes))
     rows = np.zeros((len(parameters), layout.size))
     for i, place in enumerate(layout.axes):
         if place is not None:
@@ -221,7 +221,7 @@ def _parameter_covariance(
     ):
         for joint, (function, place) in enumerate(zip(functions, places, strict=True), 1):
             if function is not None and place is not None:
-                parameters += [Parameter(part, joint, name) for name in function.form.coefficient_names]
+                parameters += constants_of(part, joint, function.form)
                 constants += range(place.start, place.stop)
     rows = np.concatenate([rows, np.eye(layout.size)[constants]])
     matrix = rows @ covariance @ rows.T

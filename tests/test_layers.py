@@ -22,8 +22,8 @@ FILES = """
 """
 CALIBRATION = """
     core.theodolite core.noise core.axes core.displacement core.sweep_fits
-    core.motion_forms core.arm core.function_fit core.drives core.transmission
-    core.parameter_covariance core.estimate core.phi_uncertainty core.arm_jacobian core.coupling
+    core.motion_forms core.parameter_covariance core.arm core.function_fit core.drives core.transmission
+    core.estimate core.phi_uncertainty core.arm_jacobian core.coupling
     core.walk_from_base core.joint_by_joint core.refinement_problem core.refined_curves core.refinement
     core.arc_needed core.live_sweep core.base_placement core.findings core.calibration
     core.solve_figures

@@ -6,8 +6,9 @@ import numpy as np
 
 from core.calibrated_arm import CalibratedArm
 from core.gap.calibration_doubt import doubt_columns
+from core.gap.design import motions_of
 from core.gap.doings import doings
-from core.gap.effects.candidate import Candidate
+from core.gap.effects.candidate import Candidate, Column
 from core.gap.kept_out import mean_square
 from core.gap.observations import Observations, observe
 from core.gap.placement import place, placement_slots, with_placement
@@ -38,19 +39,15 @@ class CorrectedSim:
 
     def motions(self, seen: Observations) -> dict[Slot, Array]:
         """The small motions at the points of a campaign, (m,) each."""
-        told = doings(seen)
-        out: dict[Slot, Array] = {slot: np.full(seen.count, value) for slot, value in self.geometry}
-        for column, number in zip(doubt_columns(seen), self.doubt, strict=True):
-            for slot, feature in column:
-                out[slot] = out.get(slot, 0.0) + feature * number
-        same = seen.campaign.digest == self.digest
-        for cause, numbers in zip(self.causes, self.numbers, strict=True):
-            if cause.place.effect in SESSION_BOUND and not same:
-                continue
-            for column, number in zip(cause.columns(told), numbers, strict=True):
-                for slot, feature in column:
-                    out[slot] = out.get(slot, 0.0) + feature * number
-        return out
+        told, same = doings(seen), seen.campaign.digest == self.digest
+        ones = np.ones(seen.count)
+        columns: list[Column] = [*([(slot, ones)] for slot, _ in self.geometry), *doubt_columns(seen)]
+        numbers = [np.array([value for _, value in self.geometry]), self.doubt]
+        for cause, values in zip(self.causes, self.numbers, strict=True):
+            if same or cause.place.effect not in SESSION_BOUND:
+                columns += cause.columns(told)
+                numbers.append(values)
+        return motions_of(columns, np.concatenate(numbers))
 
     def points_m(self, campaign: Campaign) -> tuple[Observations, Array]:
         """The points that a campaign would have measured, placed by what it did measure, (m, 3)."""

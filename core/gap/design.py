@@ -81,11 +81,16 @@ class Design:
 
     def motions(self, numbers: Array) -> dict[Slot, Array]:
         """The small motions that the columns make with these unknown numbers, (p,)."""
-        out: dict[Slot, Array] = {}
-        for column, scale, number in zip(self.columns, self.scale, numbers, strict=True):
-            for slot, feature in column:
-                out[slot] = out.get(slot, 0.0) + feature * (scale * number)
-        return out
+        return motions_of(self.columns, self.scale * numbers)
+
+
+def motions_of(columns: Sequence[Column], numbers: Array) -> dict[Slot, Array]:
+    """The small motions that columns make together, (m,) each, with one number for each column, (p,)."""
+    out: dict[Slot, Array] = {}
+    for column, number in zip(columns, numbers, strict=True):
+        for slot, feature in column:
+            out[slot] = out.get(slot, 0.0) + feature * number
+    return out
 
 
 def is_steady(feature: Array) -> bool:

@@ -35,6 +35,8 @@ motion looks like ripple; anything smooth looks like a mesh of few teeth; a load
 looks like what that joint does under any: no such name is likelier than not."""
 IDLE_AT_BEST = 0.8
 """Where a form's numbers are mostly idle, a plainer one would do."""
+FORETOLD = 2.0
+"""Odds of a name whose first number can have one sign only, where it has that sign."""
 TWIN_ODDS = 0.05
 """A candidate at least so probable beside the named one is its twin."""
 
@@ -69,7 +71,7 @@ def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, floa
     rough = np.array([LOST_MOTION_ERROR if _both_lose_motion(stand.place, one) else FORM_ERROR for one in places])
     weight = np.exp(_odds(evidence, wide, mine, rough))
     # A name whose sign was foretold has put all its hope there.
-    weight[[place.effect in AGAINST for place in places]] *= 2.0
+    weight[[place.effect in AGAINST for place in places]] *= FORETOLD
     for k, group in enumerate(best):
         # Another name that fits as well, by numbers that its effect never has, is no rival; but play and hysteresis
         # differ soon after the motor turned round alone, where there may be no point.

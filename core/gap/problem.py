@@ -14,7 +14,7 @@ from core.gap.evidence import Evidence
 from core.gap.gram import Gram, gram, whitened
 from core.gap.observations import Observations
 from core.gap.placement import placement_priors, placement_slots
-from core.gap.sim import Sim
+from core.gap.sim import Sim, Slot
 from core.gap.whitening import Whitening
 from core.geometry import Array
 
@@ -63,9 +63,7 @@ class Problem:
 
     def nuisance_columns(self, seen: Observations) -> list[Column]:
         """The nuisance columns over other points of the same arm."""
-        ones = np.ones(seen.count)
-        slots = [column[0][0] for column in self.design.columns[: self.nuisance - self.doubt]]
-        return [*([(slot, ones)] for slot in slots), *doubt_columns(seen)]
+        return _nuisance([column[0][0] for column in self.design.columns[: self.nuisance - self.doubt]], seen)
 
     @property
     def cost(self) -> Array:
@@ -89,9 +87,9 @@ def pose_problem(
     sim: Sim, doings: Doings, candidates: Sequence[Candidate], residual_m: Array, white: Whitening
 ) -> Problem:
     """The columns of all candidates over the points, scaled so that one is one noise standard deviation rms."""
-    placement, doubt = placement_slots(sim.seen), doubt_columns(sim.seen)
-    ones = np.ones(sim.seen.count)
-    nuisance: list[Column] = [*([(slot, ones)] for slot in (*placement, *geometry_slots(doings))), *doubt]
+    placement = placement_slots(sim.seen)
+    slots = [*placement, *geometry_slots(doings)]
+    nuisance = _nuisance(slots, sim.seen)
     columns, sizes, slices = candidate_columns(candidates, doings)
     start = len(nuisance)
     own = tuple(slice(s.start + start, s.stop + start) for s in slices)
@@ -109,12 +107,18 @@ def pose_problem(
         own,
         len(placement),
         start - len(placement),
-        len(doubt),
+        start - len(slots),
         placement_priors(sim.seen, placement),
         residual_m,
         white,
         gram(whole, own, residual_m, white, NULL_DRAWS, NULL_SEED),
     )
+
+
+def _nuisance(slots: Sequence[Slot], seen: Observations) -> list[Column]:
+    """One column for each small motion that is the same at every point, and what a calibration knows it may err by."""
+    ones = np.ones(seen.count)
+    return [*([(slot, ones)] for slot in slots), *doubt_columns(seen)]
 
 
 def _units(columns: Array, slices: Sequence[slice], count: int) -> Array:
