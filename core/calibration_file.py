@@ -33,7 +33,7 @@ from core.units import displacement_units, to_si
 
 PHI_SLACK_RAD = 1e-9
 SKEW = 1e-6
-"""Correlations that differ by less between the two halves of a covariance are rounding."""
+"""Correlations that differ by less between the halves of a covariance, or variances less negative, are rounding."""
 
 
 def read_calibration(path: Path | str) -> CalibratedArm:
@@ -181,6 +181,9 @@ def _covariance(top: JsonRecord, estimate: ArmEstimate) -> ParameterCovariance |
     std = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     if (np.diag(matrix) < 0).any() or (np.abs(matrix - matrix.T) > SKEW * np.outer(std, std)).any():
         raise record.failed("matrix is not a covariance, expected a symmetric one with variances on its diagonal")
+    unit = np.where(std > 0, std, 1.0)
+    if names and np.linalg.eigvalsh(matrix / np.outer(unit, unit)).min() < -SKEW:
+        raise record.failed("matrix is not a covariance, expected one that gives no combination a negative variance")
     return ParameterCovariance(tuple(known[str(name)] for name in names), matrix)
 
 

@@ -123,6 +123,12 @@ def put(*path_and_value: Any) -> Callable[[Document], object]:
     return edit
 
 
+def correlate_by_three(document: Document) -> None:
+    """Two parameters that would err together by more than each alone."""
+    matrix = document["covariance"]["matrix"]
+    matrix[-1][-2] = matrix[-2][-1] = 3 * np.sqrt(matrix[-1][-1] * matrix[-2][-2])
+
+
 WRONG = [
     (drop("nominal_robot"), ["nominal robot"]),
     (put("format", "trueaxis-gap/1"), ["format", "trueaxis-gap/1", "trueaxis-calibration/1"]),
@@ -149,6 +155,7 @@ WRONG = [
     (put("covariance", "parameters", 0, "frame 1 b_m"), ["covariance.parameters", "each once"]),
     (put("covariance", "matrix", 0, 1, 7.0), ["covariance", "symmetric"]),
     (put("covariance", "matrix", 5, 5, -1.0), ["covariance", "variances"]),
+    (correlate_by_three, ["covariance", "negative variance"]),
     (put("covariance", "matrix", 3, [1.0]), ["covariance.matrix", "numbers"]),
 ]
 
