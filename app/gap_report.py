@@ -1,7 +1,5 @@
 """The report of a diagnosis on one page: where sim and real part, why, how far that shrinks, what is not known."""
 
-import math
-
 import numpy as np
 
 from app.figures.gap_map import gap_map_figure
@@ -18,16 +16,15 @@ from app.gap_tables import (
     shown_transfers,
 )
 from app.report_page import Item, Page, Plot, Section, page_html
-from core.gap.ledger import closed_share, switches
+from core.gap.ledger import switches
 from core.gap.place_words import MEANINGS, effect_name
 from core.gap.result import UNKNOWN, GapReport, Verdict
 from core.gap.verdict_words import (
     capital,
     cause_sentence,
+    key_numbers,
     left_sentence,
-    length_words,
     next_sentence,
-    percent,
     verdict_sentence,
 )
 from core.version import VERSION
@@ -113,16 +110,8 @@ def _summary(report: GapReport) -> tuple[str, ...]:
 
 
 def _key_numbers(report: GapReport) -> tuple[tuple[str, str], ...]:
-    closed = closed_share(report)
-    return (
-        ("Verdict", VERDICTS[report.verdict]),
-        ("Gap", length_words(report.gap_rms_m)),
-        *([("Calibration moved", length_words(report.within_calibration_rms_m))] if report.calibration_matters else []),
-        ("Left", length_words(report.left_rms_m)),
-        ("Floor", length_words(report.noise.floor_rms_m)),
-        *([("Share closed", percent(closed))] if math.isfinite(closed) and report.causes else []),
-        ("Points", f"{len(report.rows)}"),
-    )
+    points = ("Points", f"{len(report.rows)}")
+    return (("Verdict", VERDICTS[report.verdict]), *key_numbers(report), points)
 
 
 def _facts(report: GapReport) -> tuple[tuple[str, str], ...]:

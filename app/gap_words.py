@@ -5,10 +5,9 @@ from html import escape
 from app.gap_bench import Diagnosed
 from app.gap_tables import cause_parameters, probability_words
 from app.words import block
-from core.gap.ledger import closed_share
 from core.gap.place_words import either_of, place_words
 from core.gap.result import Cause, GapReport, Verdict
-from core.gap.verdict_words import left_sentence, length_words, next_sentence, percent, verdict_sentence
+from core.gap.verdict_words import key_numbers, left_sentence, next_sentence, percent, verdict_sentence
 from core.wording import typeset
 
 LOOKS = {
@@ -45,15 +44,7 @@ def verdict_words(found: Diagnosed | None, outdated: bool) -> str:
 
 def numbers_words(report: GapReport) -> str:
     """Gap, what is left, floor."""
-    closed = closed_share(report)
-    rows = [
-        ("Gap", length_words(report.gap_rms_m)),
-        *([("Calibration moved", length_words(report.within_calibration_rms_m))] if report.calibration_matters else []),
-        ("Left with all causes", length_words(report.left_rms_m)),
-        ("Floor", length_words(report.noise.floor_rms_m)),
-        *([("Share closed", percent(closed))] if report.causes and closed == closed else []),
-    ]
-    body = "".join(f"<tr><td>{name}</td><td class='n'>{_text(value)}</td></tr>" for name, value in rows)
+    body = "".join(f"<tr><td>{name}</td><td class='n'>{_text(value)}</td></tr>" for name, value in key_numbers(report))
     left = f"<p class='soft'>{_text(left_sentence(report))}</p>" if report.causes else ""
     return block(f"<table>{body}</table>{left}", "gap-numbers")
 

@@ -2,6 +2,7 @@
 
 import math
 
+from core.gap.ledger import closed_share
 from core.gap.place_words import CALIBRATION, cause_words, either_of, listed
 from core.gap.result import NEAR_FLOOR, UNKNOWN, Cause, GapReport, Rivals, Verdict
 from core.wording import fixed
@@ -45,7 +46,7 @@ def verdict_sentence(report: GapReport) -> str:
         case Verdict.PARTLY_EXPLAINED:
             return (
                 f"{_causes(report)} {_takes(report)} the gap from {gap} to {left}; "
-                f"what is left stands out of the noise ({floor}) and has no name."
+                f"what is left stands out of the noise ({floor}) and has no name{_located(report)}."
             )
     near = report.left_rms_m <= NEAR_FLOOR * report.noise.floor_rms_m
     end = f"which is down to the noise ({floor})" if near else f"while noise alone would leave {floor}"
@@ -80,6 +81,20 @@ def cause_sentence(cause: Cause) -> str:
     )
 
 
+def key_numbers(report: GapReport) -> list[tuple[str, str]]:
+    """The gap, what is left of it and the floor under it, by name and in words."""
+    closed = closed_share(report)
+    unnamed = len(_named(report)) < len(report.causes)
+    rows = [("Gap", length_words(report.gap_rms_m))]
+    if report.calibration_matters:
+        rows.append(("Calibration moved", length_words(report.within_calibration_rms_m)))
+    rows.append(("Left with the named causes" if unnamed else "Left", length_words(report.left_rms_m)))
+    rows.append(("Floor", length_words(report.noise.floor_rms_m)))
+    if report.causes and math.isfinite(closed):
+        rows.append(("Share closed", percent(closed)))
+    return rows
+
+
 def left_sentence(report: GapReport) -> str:
     """Whether what is left is noise, and how that was judged."""
     test = report.left_test
@@ -109,19 +124,25 @@ def _chance(p_value: float) -> str:
     return "p < 0.0001" if p_value < 1e-4 else f"p = {p_value:.2g}"
 
 
+def _named(report: GapReport) -> list[Cause]:
+    """The causes that the corrected sim has: what has no name is in what they leave."""
+    return [cause for cause in report.causes if cause.place.effect != UNKNOWN]
+
+
 def _causes(report: GapReport) -> str:
-    words = [f"{'an ' if c.place.effect == UNKNOWN else ''}{cause_words(c)}" for c in report.causes[:MOST_NAMED]]
-    more = len(report.causes) - len(words)
+    named = _named(report)
+    words = [cause_words(cause) for cause in named[:MOST_NAMED]]
+    more = len(named) - len(words)
     words += [f"{more} other cause{'s' if more > 1 else ''}"] if more else []
     words += [CALIBRATION] if words and report.calibration_matters else []
-    if len(words) > 1 and any(len(cause.twins) > 1 for cause in report.causes):
+    if len(words) > 1 and any(len(cause.twins) > 1 for cause in named):
         # Alternatives within a list need a stronger mark between its parts.
         words = ["; ".join([*words[:-1], f"and {words[-1]}"])]
     return capital(listed(words)) or "Nothing"
 
 
 def _takes(report: GapReport) -> str:
-    return "take" if len(report.causes) > 1 or (report.causes and report.calibration_matters) else "takes"
+    return "take" if len(_named(report)) + report.calibration_matters > 1 else "takes"
 
 
 def _located(report: GapReport) -> str:
