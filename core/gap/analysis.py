@@ -23,6 +23,7 @@ from core.gap.scatter import joint_scatter
 from core.gap.search import Found, search
 from core.gap.sharpened import sharpened
 from core.gap.sim import Sim
+from core.gap.swings import swings
 from core.gap.whitening import whitening
 from core.geometry import Array
 
@@ -238,6 +239,7 @@ def _settled(before: NoiseFound, after: NoiseFound) -> bool:
         np.trace(after.covariance_m2, axis1=1, axis2=2).mean() / np.trace(before.covariance_m2, axis1=1, axis2=2).mean()
     )
     same = abs(ratio - 1) < 0.15 and abs(after.memory - before.memory) < 0.1
+    same &= after.scattering == before.scattering
     return bool(same and np.abs(after.weight - before.weight).mean() < 0.003)
 
 
@@ -393,7 +395,7 @@ def _learn(
     """What a flexible fit says of the noise, sharper atoms, and residuals about the fitted state.
 
     Args:
-        steps: whether steps of encoders are looked for.
+        steps: whether steps of encoders and swings of the base are looked for.
     """
     evidence, prior, found = best.evidence, best.geometry_prior, best.found
     given, everything = best.given, best.everything
@@ -410,8 +412,10 @@ def _learn(
         if steps and found.chosen.groups:
             aims.append(_left(problem, evidence, prior, given)[0])
         better += encoder_steps(problem.sim, told, aims, scale)
+    if steps:
+        better += swings(problem.sim, _left(problem, evidence, prior, given)[0], scale)
     if only is not None:
-        better = [one for one in better if only(one)]
+        better = [one for one in better if not one.named or only(one)]
     state = joined(given, Chosen(found.chosen.groups[:1], found.chosen.sizes[:1]))
     return Learnt(noise, better, *_about_fit(problem, evidence, prior, state, given))
 

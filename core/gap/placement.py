@@ -71,8 +71,16 @@ def _directions() -> list[Array]:
     return [*Rotation.random(STARTS, random_state=7).as_matrix(), np.eye(3)]
 
 
-def _known_places(seen: Observations) -> Array:
-    return np.array([target.point_m or (0.0, 0.0, 0.0) for target in seen.campaign.targets])
+def _likely_places(seen: Observations) -> Array:
+    """Where targets are said to be; those of which nobody knows are near the tool, or halfway along their link.
+
+    It matters along parallel axes alone, where nothing tells a higher base from lower targets.
+    """
+    ends_m, last = seen.chain.link_transforms[:, :3, 3], seen.chain.joint_count
+    likely = (
+        ends_m[t.link - 1] / (1 if t.link == last else 2) if t.link else np.zeros(3) for t in seen.campaign.targets
+    )
+    return np.array([t.point_m or tuple(place) for t, place in zip(seen.campaign.targets, likely, strict=True)])
 
 
 def _linear_rest(seen: Observations, weights: Array, turn: Array) -> tuple[float, Sim]:
@@ -80,7 +88,7 @@ def _linear_rest(seen: Observations, weights: Array, turn: Array) -> tuple[float
     frames = link_frames(seen.chain, seen.net)[np.arange(seen.count), seen.link - 1]
     rotation, origin = turn @ frames[:, :3, :3], frames[:, :3, 3] @ turn.T
     unknown = [t for t in np.unique(seen.target) if seen.campaign.targets[t].point_m is None]
-    places = _known_places(seen)
+    places = _likely_places(seen)
     rest = seen.point_m - origin - (rotation @ places[seen.target][:, :, None])[:, :, 0]
     columns = np.zeros((seen.count, 3, 3 + 3 * len(unknown)))
     columns[:, :, :3] = np.eye(3)
@@ -106,7 +114,7 @@ def _refined(sim: Sim, weights: Array) -> Sim:
     """Steps of Levenberg and Marquardt on base and targets together."""
     slots = placement_slots(sim.seen)
     priors = placement_priors(sim.seen, slots)
-    stated = _known_places(sim.seen)
+    stated = _likely_places(sim.seen)
     precision = np.where(np.isfinite(priors), 1.0 / np.maximum(priors, 1e-9) ** 2, 0.0)
     misfit, damping = _misfit(sim, weights), DAMPED[0]
     for _ in range(ROUNDS):

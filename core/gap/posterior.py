@@ -11,6 +11,7 @@ from scipy.special import expit
 
 from core.gap.effects.candidate import motors
 from core.gap.evidence import Chosen, joined, without
+from core.gap.lacking import lacks
 from core.gap.open_set import AT_FLOOR, Judge, Stand, chosen_of, is_slow
 from core.gap.plausible import AGAINST, gives_at_one_joint, mostly_idle, own, plausible
 from core.gap.result import Place
@@ -32,7 +33,8 @@ BESIDE_UNKNOWN = 0.4
 AT_BEST, LIKE_LOST_MOTION = 0.5, frozenset({"mesh", "quantisation"})
 """Where one joint alone moves, everything is some function of it; where nobody wrote down how points were reached, lost
 motion looks like ripple; anything smooth looks like a mesh of few teeth; a load under which one joint alone gives way
-looks like what that joint does under any: no such name is likelier than not."""
+looks like what that joint does under any; what leaves much at its own place is likely a relative's: no such name is
+likelier than not."""
 IDLE_AT_BEST = 0.8
 """Where a form's numbers are mostly idle, a plainer one would do."""
 FORETOLD = 2.0
@@ -150,7 +152,7 @@ def has_name(judge: Judge, stand: Stand, others: Chosen) -> float:
     unlogged = stand.place.effect in LIKE_LOST_MOTION and not told.past.complete
     if mostly_idle(one):
         most = IDLE_AT_BEST
-    if len(motors(told)) < 2 or unlogged or slow or gives_at_one_joint(one):
+    if len(motors(told)) < 2 or unlogged or slow or gives_at_one_joint(one) or lacks(judge, stand, others):
         most = AT_BEST
     return most * float(expit((stand.local - NAMED_AT) / NAMED_WIDTH))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.gap.analysis import Analysis
-from core.gap.evidence import joined, without
+from core.gap.evidence import Chosen, joined, without
 from core.gap.open_set import AT_FLOOR, EVERYWHERE, Judge, Stand, chosen_of, stands, unknown_at
 from core.gap.posterior import sufficient
 from core.gap.result import UNKNOWN, Place
@@ -18,8 +18,9 @@ SURE_OF_REST = 0.1
 MANY, MANY_LEAVE = 3, 4.0
 """Names that together leave too much: none of their joints is where something acts. More of them than that must leave
 less than so many floors (mean squares), or they only imitate something else."""
-ONE_JOINT = 0.8
-"""Of the evidence for functions of time or configuration: where one joint's have as much, it is that joint."""
+ONE_JOINT, LEAVES = 0.8, 2.0
+"""Of the evidence for functions of time or configuration: where one joint's have as much and leave less than so
+many times what those leave beyond the floor, it is that joint."""
 FAINT = 1.3
 """Times the noise (mean squares) of what does not stand out of it by itself."""
 
@@ -54,7 +55,32 @@ class Said:
             sharp = replace(one, place=self._sharper(one.place)) if one.unknown else one
             if not any(sharp.unknown and other.place.same_as(sharp.place) for other in out):
                 out.append(sharp)
-        return out
+        return self._wider(out)
+
+    def _wider(self, told: list[Stand]) -> list[Stand]:
+        """Time or the configuration in place of an unknown's joint, where an error of that joint leaves far more."""
+        if not told or not all(one.unknown for one in told) or told[0].place.joint is None:
+            return told
+        joint, local = f"joint {told[0].place.joint}", self.judge.local
+        wide = {v: self._beyond_m2(v) for v in ("time", "configuration") if v in local and local[v].groups}
+        best = min(wide, key=wide.__getitem__, default=None)
+        if best is None or not self._leaves_more(joint, best) or self._evidence(joint) > self._evidence(best):
+            return told
+        place = unknown_at(best)
+        instead = Stand(place, local[best].groups, local[best].sizes, 0.0)
+        return [instead, *(one for one in told[1:] if not one.place.same_as(place))]
+
+    def _evidence(self, variable: str) -> float:
+        return self.analysis.evidence.given(self.judge.local.get(variable, Chosen()))
+
+    def _beyond_m2(self, variable: str) -> float:
+        """What functions of one variable leave beyond the floor on kept-out points."""
+        left_m2 = self.judge.open.square_m2(self.judge.local.get(variable, Chosen()))
+        return max(left_m2 - self.judge.floor_m2, 0.0)
+
+    def _leaves_more(self, joint: str, variable: str) -> bool:
+        """Whether errors of one joint leave far more than functions of time or configuration do."""
+        return self._beyond_m2(joint) > LEAVES * self._beyond_m2(variable) + 0.5 * self.judge.floor_m2
 
     def _sharper(self, place: Place) -> Place:
         """A joint instead of time or the whole configuration, where an error of that joint alone says nearly as much.
@@ -63,12 +89,11 @@ class Said:
         """
         if place.variable not in ("configuration", "time"):
             return place
-        evidence = {variable: self.analysis.evidence.given(chosen) for variable, chosen in self.judge.local.items()}
-        of_joints = {variable: value for variable, value in evidence.items() if variable.startswith("joint")}
-        best = max(of_joints, key=of_joints.__getitem__, default=None)
-        if best is None or of_joints[best] < ONE_JOINT * evidence.get(place.variable, 0.0):
+        joints = [variable for variable in self.judge.local if variable.startswith("joint")]
+        best = max(joints, key=self._evidence, default=None)
+        if best is None or self._evidence(best) < ONE_JOINT * self._evidence(place.variable):
             return place
-        return unknown_at(best)
+        return place if self._leaves_more(best, place.variable) else unknown_at(best)
 
     def _ordered(self) -> list[Stand]:
         judged = [*self._geometry_stands(), *stands(self.judge)]

@@ -39,8 +39,8 @@ def joint_scatter(sim: Sim, doings: Doings, left_m: Array, white: Whitening) -> 
     count = left.size
     most = -0.5 * count * np.log(np.sum(left**2) / count) + LEAST_GAIN
     best: Scatter | None = None
-    for j in motors(doings):
-        field = sim.fields([Slot(Part.DRIVE, j)])[:, :, 0]
+    for j, part in _movers(doings):
+        field = sim.fields([Slot(part, j)])[:, :, 0]
         answer = white.rows(field)[used]
         strength = np.sum(answer**2, axis=1)
         along = np.sum(answer * left, axis=1) ** 2 / np.maximum(strength, 1e-300)
@@ -55,3 +55,10 @@ def joint_scatter(sim: Sim, doings: Doings, left_m: Array, white: Whitening) -> 
             if value > most:
                 most, best = value, Scatter(j + 1, float(size), float(scale), field)
     return best
+
+
+def _movers(doings: Doings) -> list[tuple[int, Part]]:
+    """Motors, and joints that do not pass on to the next one what they do themselves."""
+    passed = doings.seen.chain.coupling_gains
+    alone = [j for j in motors(doings) if j + 1 < len(passed) and passed[j + 1]]
+    return [*((j, Part.DRIVE) for j in motors(doings)), *((j, Part.JOINT) for j in alone)]

@@ -56,10 +56,24 @@ def search(
         chosen = chosen.plus(int(among[best]), float(gains.size[best]))
         if len(chosen.groups) > 1:
             chosen = _exchanged(evidence, among, cost, chosen, given)
+    chosen = _needed(evidence, cost, chosen, given, threshold)
     total = evidence.given(joined(given, chosen)) - sum(cost[g] for g in chosen.groups)
     main = _without_the_least(evidence, chosen, given)
     worth = worth_naming(evidence, among, cost, chosen, main, given)
     return Found(chosen, alone, alone_size, worth, main, float(total))
+
+
+def _needed(evidence: Evidence, cost: Array, chosen: Chosen, given: Chosen, threshold: float) -> Chosen:
+    """What is left when candidates are dropped that say no more than noise beside those that came after them."""
+    while len(chosen.groups) > 1:
+        whole = evidence.given(joined(given, chosen))
+        adds = [whole - evidence.given(joined(given, chosen.without(k))) for k in range(len(chosen.groups))]
+        adds = np.array(adds) - cost[list(chosen.groups)]
+        least = int(np.argmin(adds))
+        if adds[least] > threshold:
+            break
+        chosen = chosen.without(least)
+    return chosen
 
 
 def worth_naming(

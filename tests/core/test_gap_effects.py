@@ -355,10 +355,12 @@ class TestStructure:
             axes = beam_axes(along)
             kilograms = (told.loads.carried_kg[i] + told.seen.payload_kg)[:, None]
             force = kilograms * told.loads.force_kilogram[:, i]
+            weight = told.loads.link_kg[i] * told.loads.force_kilogram[:, i]
             slope, shift = np.zeros((len(force), 3)), np.zeros((len(force), 3))
             places = (np.arange(400) + 0.5) / 400
             for share in places:
                 moment = told.middle_moment[:, i] + np.cross((0.5 - share) * along, force)
+                moment += np.cross((1 - share) / 2 * along, (1 - share) * weight)
                 curve = (moment @ axes.T * give) @ axes / len(places)
                 slope += curve
                 shift += np.cross(curve, (1 - share) * along)

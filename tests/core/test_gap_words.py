@@ -8,7 +8,7 @@ import pytest
 from core.gap.ledger import MOST_SWITCHES, closed_share, difference_with, ledger, switches
 from core.gap.place_words import MEANINGS, NAMES, cause_words, listed, place_words
 from core.gap.result import Place
-from core.gap.verdict_words import left_sentence, length_words, next_sentence, percent, verdict_sentence
+from core.gap.verdict_words import key_numbers, left_sentence, length_words, next_sentence, percent, verdict_sentence
 from tests.core import gap_reports
 
 MADE = ("explained", "partly_explained", "unexplained", "no_gap", "barely_known")
@@ -140,7 +140,17 @@ def test_a_sentence_names_a_few_causes_and_counts_the_others() -> None:
 def test_causes_of_which_one_is_a_class_are_parted_by_semicolons() -> None:
     classes = "or flexure of link 1; backlash of joint 3; and coupling from joint 3 to joint 4 take"
     assert classes in verdict_sentence(made("explained"))
-    assert "Compliance of joint 2 and an unknown effect at joint 5 take" in verdict_sentence(made("partly_explained"))
+
+
+def test_what_has_no_name_is_in_what_is_left() -> None:
+    sentence = verdict_sentence(made("partly_explained"))
+    assert sentence.startswith("Compliance of joint 2 takes the gap")
+    assert sentence.endswith("has no name (an unknown effect at joint 5).")
+
+
+@pytest.mark.parametrize(("kind", "words"), [("explained", "Left"), ("partly_explained", "Left with the named causes")])
+def test_the_key_numbers_say_what_was_left_by_what(kind: str, words: str) -> None:
+    assert key_numbers(made(kind))[1] == (words, length_words(made(kind).left_rms_m))
 
 
 def test_data_that_cannot_show_a_gap_are_not_said_to_have_none() -> None:

@@ -7,9 +7,11 @@ import numpy as np
 
 from core.gap.doings import Doings
 from core.gap.effects.candidate import ANGLE, Candidate, Column, drive, driven, unit
+from core.gap.observations import Observations
 from core.gap.result import Place
 from core.gap.sim import Part, Slot
 from core.geometry import Array
+from core.robot import Robot
 
 TINY = 1e-9
 NEARLY_ALONG = 0.99
@@ -135,54 +137,97 @@ def _compliance(doings: Doings, joint: int, atom: str, load: Load) -> Candidate:
 
 
 BEAM = ("its_length", "its_side", "its_height")
-Bend = Callable[[Doings, int, Array, Array], list[Column]]
-"""How a link gives about each of its axes, for a moment at its middle (m, 3) and a force that it carries (m, 3)."""
+Bend = Callable[[Doings, int, Array, Array, Array], list[Column]]
+"""How a link gives about each of its axes, for a moment at its middle, a force that it carries and its own weight, each
+(m, 3)."""
 
 
 def _flexure(doings: Doings, link: int, largest: float, bend: Bend, rough: bool) -> Candidate:
+    clamped, tilting = bend is _clamped, _tilting(doings.seen.chain, link)
+    unsure = _height_is_unknown(doings.seen)
+
     def columns(doings: Doings) -> list[Column]:
         loads, payload_kg = doings.loads, doings.seen.payload_kg[:, None]
-        one_kg, own_kg = loads.force_kilogram[:, link], loads.carried_kg[link]
-        out = bend(doings, link, doings.middle_moment[:, link], (own_kg + payload_kg) * one_kg)
+        one_kg, carried_kg = loads.force_kilogram[:, link], loads.carried_kg[link]
+        own, none = loads.link_kg[link] * one_kg, 0.0 * one_kg
+        force = (carried_kg + payload_kg) * one_kg
+        out = bend(doings, link, doings.middle_moment[:, link], force, own if clamped else none)
         if rough:
-            out += bend(doings, link, loads.middle_own[:, link], own_kg * one_kg)
+            out += bend(doings, link, loads.middle_own[:, link], carried_kg * one_kg, none)
+            # Its own weight does not twist a link.
+            out += bend(doings, link, none, none, own)[1:]
             offset = payload_kg[:, :, None] * loads.middle_offset[:, link]
-            out += [one for c in range(3) for one in bend(doings, link, offset[:, :, c], 0.0 * one_kg)]
+            out += [one for c in range(3) for one in bend(doings, link, offset[:, :, c], none, none)]
+            if unsure:
+                out += _higher(doings, link, tilting)
         return out
 
     names = tuple(f"give_about_{axis}_rad_per_nm" for axis in BEAM)
     reference = (ANGLE / max(largest, 1e-9),) * 3
     if rough:
         names += tuple(f"own_weight_give_about_{axis}_rad_per_nm" for axis in BEAM)
+        names += tuple(f"link_weight_give_about_{axis}_rad_per_nm" for axis in BEAM[1:])
         names += tuple(f"offset_{c}_times_give_about_{axis}_rad_per_nm" for c in "xyz" for axis in BEAM)
-        reference += (ROUGHLY * reference[0],) * 3 + (NEAR_M * reference[0],) * 9
-    words = (["as a clamped beam"] if bend is _clamped else []) + (["weights roughly known"] if rough else [])
+        reference += (ROUGHLY * reference[0],) * 3
+        reference += ((ROUGHLY if clamped else 1.0) * reference[0],) * 2 + (NEAR_M * reference[0],) * 9
+        if unsure:
+            names += tuple(f"height_times_give_about_{BEAM[k]}_m_per_nm" for k in tilting)
+            reference += (NEAR_M * reference[0],) * len(tilting)
+    words = (["as a clamped beam"] if clamped else []) + (["weights roughly known"] if rough else [])
     return Candidate(Place("flexure", joint=link + 1), ", ".join(words), names, columns, 4, reference)
 
 
-def _hinged(doings: Doings, link: int, moment: Array, force: Array) -> list[Column]:
-    """The link turns about its middle."""
+def _height_is_unknown(seen: Observations) -> bool:
+    """Whether all axes are parallel and no target's place is known: the base may be higher and the targets lower."""
+    along = np.abs(seen.chain.link_transforms[:-1, 2, 2])
+    free = all(seen.campaign.targets[t].point_m is None for t in np.unique(seen.target))
+    return bool(free and (along > 1 - TINY).all())
+
+
+def _tilting(chain: Robot, link: int) -> list[int]:
+    """The axes of a beam about which it tilts its joint's axis."""
+    beam = beam_axes(chain.link_transforms[link, :3, 3])
+    return [k for k, about in enumerate(beam) if np.hypot(about[0], about[1]) > TINY]
+
+
+def _higher(doings: Doings, link: int, tilting: list[int]) -> list[Column]:
+    """What a link's turns move more where the arm stands higher than it is thought to, by a metre."""
+    axes, moment = beam_axes(doings.loads.middle_m[link]), doings.middle_moment[:, link]
+    motions = [(moment @ axes[k], np.cross([0.0, 0.0, 1.0], axes[k])) for k in tilting]
+    return [
+        [(Slot(Part.BEYOND, link, 3 + c), angle * across[c]) for c in range(3) if abs(across[c]) > TINY]
+        for angle, across in motions
+    ]
+
+
+def _hinged(doings: Doings, link: int, moment: Array, force: Array, weight: Array) -> list[Column]:
+    """The link turns about its middle; half of its own weight lies beyond, on average a quarter of its length away."""
     middle = doings.loads.middle_m[link]
     out = []
     for about in beam_axes(middle):
-        angle, motion = moment @ about, np.concatenate([about, np.cross(middle, about)])
+        angle = moment @ about + weight @ np.cross(about, 2 * middle) / 8
+        motion = np.concatenate([about, np.cross(middle, about)])
         out.append([(Slot(Part.BEYOND, link, c), angle * motion[c]) for c in range(6) if abs(motion[c]) > TINY])
     return out
 
 
-def _clamped(doings: Doings, link: int, moment: Array, force: Array) -> list[Column]:
+def _clamped(doings: Doings, link: int, moment: Array, force: Array, weight: Array) -> list[Column]:
     """The link bends as a cantilever (Euler and Bernoulli): its slope is a turn about the middle, its tip goes farther.
 
-    A force f at the end of a length l makes a slope f l^2 / 2 and a shift f l^3 / 3 for a stiffness of one; a turn
-    about the middle by that slope shifts the tip by f l^3 / 4 only.
+    For a stiffness of one a force f at the end of a length l makes a slope f l^2 / 2 and a shift f l^3 / 3, of which a
+    turn about the middle by that slope makes f l^3 / 4. A weight w spread evenly makes w l^2 / 6 and w l^3 / 8, and the
+    turn w l^3 / 12 of it.
     """
     along = 2 * doings.loads.middle_m[link]
     out = []
-    for about, column in zip(beam_axes(along), _hinged(doings, link, moment, force), strict=True):
+    for about in beam_axes(along):
         across = np.cross(about, along)
-        farther = (force @ across)[:, None] * across / 12
-        shifts = [(Slot(Part.BEYOND, link, 3 + c), farther[:, c]) for c in range(3) if abs(across[c]) > TINY]
-        out.append(column + shifts)
+        slope = moment @ about + weight @ across / 6
+        farther = (force @ across / 12 + weight @ across / 24)[:, None] * across
+        turn, shift = slope[:, None] * about, farther + slope[:, None] * np.cross(along / 2, about)
+        motion = np.concatenate([turn, shift], axis=1)
+        moves = np.abs(np.concatenate([about, np.maximum(np.abs(across), np.abs(np.cross(along, about)))])) > TINY
+        out.append([(Slot(Part.BEYOND, link, int(c)), motion[:, c]) for c in np.flatnonzero(moves)])
     return out
 
 

@@ -72,6 +72,18 @@ def _time() -> Candidate:
     )
 
 
+def swing(times: float) -> Candidate:
+    """A base that swings to and fro so many times during all of the measurements."""
+
+    def columns(doings: Doings) -> list[Column]:
+        turn = 2 * np.pi * times * doings.seen.time
+        return [[(Slot(Part.BASE, 0, k), wave(turn))] for wave in (np.sin, np.cos) for k in range(6)]
+
+    names = tuple(f"{wave}_{k}" for wave in ("sine", "cosine") for k in range(6))
+    sizes = ((ANGLE / 2,) * 3 + (LENGTH,) * 3) * 2
+    return Candidate(Place(TIME, variable="time"), f"{times:.1f} times to and fro", names, columns, 1, sizes)
+
+
 def _waves(doings: Doings) -> tuple[Array, Array]:
     rng = np.random.default_rng(SEED)
     span = np.maximum(doings.seen.span, 1e-6)
