@@ -101,7 +101,7 @@ def _linear_rest(seen: Observations, weights: Array, turn: Array) -> tuple[float
     square[np.diag_indices_from(square)] += ridge * max(np.trace(square), 1e-300)
     found = np.linalg.solve(square, flat.T @ (rest * root).ravel())
     for k, t in enumerate(unknown):
-        places[t] = found[3 + 3 * k : 6 + 3 * k]
+        places[t] += found[3 + 3 * k : 6 + 3 * k]
     misfit = float(np.sum(((rest - columns @ found) * root) ** 2))
     return misfit, Sim(seen, transform(turn, found[:3]), places, seen.point_m.mean(axis=0))
 

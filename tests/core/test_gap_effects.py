@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from gap_arms import ARMS, Day, chain_points, day, net_of_motors
+from gap_arms import ARMS, Day, chain_points, day, kinds, masses, net_of_motors
 from scipy.spatial.transform import Rotation
 
 from core.gap.design import Design
@@ -18,6 +18,7 @@ from core.gap.library import candidates
 from core.gap.sim import Sim
 from core.geometry import Array, apply, invert
 from core.kinematics import active_commands, link_frames, nominal_net
+from core.robot_builders import DhRow, robot_from_dh
 
 TURNING, SLIDING = "coupled", "dh with slides"
 CONTRACT = (
@@ -70,6 +71,27 @@ def x_of(name: str, joint: int) -> Array:
 
 def same(found: Array, expected: Array) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_where_the_height_of_an_upright_arm_is_open_a_flexure_may_turn_about_a_lower_base() -> None:
+    rows = [DhRow(0.1, d, a, 0.0) for d, a in ((0.4, 0.35), (0.1, 0.3), (0.0, 0.0), (0.1, 0.0))]
+    rng, lower_m = np.random.default_rng(1), 0.2
+    robot = robot_from_dh("scara", kinds((False, False, True, False)), rows, (), masses(rng, 4), (0.0, 0.0, -1.0))
+    sim = day(robot, 1, Day(arc=7, poses=14))
+    down = sim.base[:3, :3] @ [0.0, 0.0, -lower_m]
+    lower = replace(sim, base=sim.base.copy(), target_m=sim.target_m + np.array([0.0, 0.0, lower_m]))
+    lower.base[:3, 3] += down
+    np.testing.assert_allclose(lower.points_m(), sim.points_m(), atol=1e-12)
+    told = doings(sim.seen)
+    for one in (c for c in candidates(told) if c.place.effect == "flexure" and "roughly" in c.atom):
+        tilting = [name for name in one.names if name.startswith("height")]
+        assert tilting
+        columns = Design(sim, tuple(one.columns(told)), np.ones(len(one.names))).whole()
+        below = Design(lower, tuple(one.columns(told)), np.ones(len(one.names))).whole()
+        for name in tilting:
+            give = one.names.index(f"{name.removeprefix('height_times_').removesuffix('_m_per_nm')}_rad_per_nm")
+            expected = columns[:, :, give] - lower_m * columns[:, :, one.names.index(name)]
+            np.testing.assert_allclose(below[:, :, give], expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_every_effect_of_the_contract_has_candidates_but_steps_that_have_to_be_found() -> None:

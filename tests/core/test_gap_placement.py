@@ -50,6 +50,17 @@ def test_axes_that_are_nearly_parallel_send_no_target_away() -> None:
         assert np.abs(found.target_m).max() < 1.0
 
 
+def test_along_parallel_axes_targets_are_near_the_tool() -> None:
+    """Nothing tells a higher base from lower targets: then they are taken to be where tools carry them."""
+    rows = [DhRow(0.1, d, a, 0.0) for d, a in ((0.4, 0.35), (0.0, 0.3), (0.0, 0.0), (0.5, 0.0))]
+    robot = robot_from_dh("scara", kinds((False, False, True, False)), rows)
+    sim = random_sim(robot, 2, 80)
+    found = place(sim.seen, np.ones(80))
+    last = [t for t, target in enumerate(sim.seen.campaign.targets) if target.link == 4]
+    assert misfit(found, sim.seen) < 1e-6
+    assert found.target_m[last, 2].mean() == pytest.approx(0.5, abs=0.3)
+
+
 @pytest.mark.parametrize("name", ["phi", "dh with slides", "coupled"])
 @settings(max_examples=3)
 @given(seed=SEEDS)

@@ -46,6 +46,18 @@ def test_a_joint_that_scatters_is_found_with_its_size(joint: int) -> None:
     assert np.trace(shaped, axis1=1, axis2=2).mean() == pytest.approx(np.trace(given, axis1=1, axis2=2).mean(), rel=0.2)
 
 
+@pytest.mark.parametrize("part", [Part.DRIVE, Part.JOINT])
+def test_a_joint_that_drives_the_next_one_scatters_with_it_or_alone(part: Part) -> None:
+    sim = day(ARMS["coupled"](1), 1, Day(arc=25, poses=40, visits=3))
+    told, rng = doings(sim.seen), np.random.default_rng(8)
+    moved = sim.fields([Slot(part, 1)])[:, :, 0] * rng.normal(0.0, SIZE_RAD, told.count)[:, None]
+    covariance = np.tile(SIGMA_M**2 * np.eye(3), (told.count, 1, 1))
+    noise = rng.normal(0.0, SIGMA_M, (told.count, 3))
+    found = joint_scatter(sim, told, moved + noise, whitening(covariance, np.ones(told.count)))
+    assert found is not None
+    assert found.joint == 2
+
+
 def test_an_even_scatter_is_no_joints() -> None:
     """The likelihood must gain ten: one even campaign in thousands does."""
     told, sim, covariance = cell()

@@ -60,6 +60,18 @@ def sway(sim: Sim) -> Array:
     return 2e-4 * np.sin(7.0 * sim.seen.time[:, None] + phase)
 
 
+def hurry(sim: Sim) -> Array:
+    """The whole arm sways to and fro too fast for any smooth function of time."""
+    phase = np.array([0.3, 1.9, 4.0])
+    return 3e-4 * np.sin(2 * np.pi * 16.3 * sim.seen.time[:, None] + phase)
+
+
+def shake(sim: Sim) -> Array:
+    """Joint 2 comes to rest a little elsewhere each time."""
+    angles = 3e-4 * np.random.default_rng(2).normal(size=sim.seen.standstill.max() + 1)
+    return sim.moved_m({Slot(Part.DRIVE, 1): angles[sim.seen.standstill]}) - sim.points_m()
+
+
 @pytest.mark.parametrize(
     ("field", "place_"),
     [
@@ -67,8 +79,10 @@ def sway(sim: Sim) -> Array:
         (hose, Place(UNKNOWN, joint=2)),
         (wander, Place(UNKNOWN, joint=1)),
         (sway, Place(UNKNOWN, variable="time")),
+        (hurry, Place(UNKNOWN, variable="time")),
+        (shake, Place(UNKNOWN, joint=2)),
     ],
-    ids=["bent room", "joint by another", "floating joint", "swaying base"],
+    ids=["bent room", "joint by another", "floating joint", "swaying base", "hurrying base", "shaking joint"],
 )
 def test_what_has_no_name_is_located(field: Field, place_: Place) -> None:
     found = diagnose(bent(measured(crane_cell()), field))
