@@ -159,7 +159,7 @@ def _flexure(doings: Doings, link: int, largest: float, bend: Bend, rough: bool)
             offset = payload_kg[:, :, None] * loads.middle_offset[:, link]
             out += [one for c in range(3) for one in bend(doings, link, offset[:, :, c], none, none)]
             if unsure:
-                out += _higher(doings, link, tilting)
+                out += _higher(doings, link, own if clamped else none, tilting)
         return out
 
     names = tuple(f"give_about_{axis}_rad_per_nm" for axis in BEAM)
@@ -190,14 +190,14 @@ def _tilting(chain: Robot, link: int) -> list[int]:
     return [k for k, about in enumerate(beam) if np.hypot(about[0], about[1]) > TINY]
 
 
-def _higher(doings: Doings, link: int, tilting: list[int]) -> list[Column]:
+def _higher(doings: Doings, link: int, weight: Array, tilting: list[int]) -> list[Column]:
     """What a link's turns move more where the arm stands higher than it is thought to, by a metre."""
-    axes, moment = beam_axes(doings.loads.middle_m[link]), doings.middle_moment[:, link]
-    motions = [(moment @ axes[k], np.cross([0.0, 0.0, 1.0], axes[k])) for k in tilting]
-    return [
-        [(Slot(Part.BEYOND, link, 3 + c), angle * across[c]) for c in range(3) if abs(across[c]) > TINY]
-        for angle, across in motions
-    ]
+    along, moment = 2 * doings.loads.middle_m[link], doings.middle_moment[:, link]
+    out = []
+    for about in beam_axes(along)[tilting]:
+        angle, shift = moment @ about + weight @ np.cross(about, along) / 6, np.cross([0.0, 0.0, 1.0], about)
+        out.append([(Slot(Part.BEYOND, link, 3 + c), angle * shift[c]) for c in range(3) if abs(shift[c]) > TINY])
+    return out
 
 
 def _hinged(doings: Doings, link: int, moment: Array, force: Array, weight: Array) -> list[Column]:
