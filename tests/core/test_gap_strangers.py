@@ -90,6 +90,12 @@ def test_what_has_no_name_is_located(field: Field, place_: Place) -> None:
     assert not any(cause.probability > 0.5 for cause in found.causes if cause.place.effect != UNKNOWN)
 
 
+def test_what_follows_the_speed_of_a_joint_is_told_there() -> None:
+    """Where the library does not know latency."""
+    found = diagnose(measured(crane_cell(), "latency:2:10ms"), without=["latency"])
+    assert found.causes[0].place.same_as(Place(UNKNOWN, joint=2))
+
+
 def test_what_is_true_beside_a_cause_does_not_speak_against_it() -> None:
     """Of a mesh and a far smaller change of scale, neither given the other: the mesh explains more in its place."""
     seen = observe(measured(crane_cell(), "scale:-:500ppm", "mesh:3:0.03deg"))

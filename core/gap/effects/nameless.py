@@ -1,5 +1,5 @@
-"""Smooth functions without a name: of one joint's place, of the sense it came in, of time, of the configuration, alone
-or at one joint, of where a point lies in the room.
+"""Smooth functions without a name: of one joint's place, of the sense it came in or the speed it has, of time, of the
+configuration, alone or at one joint, of where a point lies in the room.
 
 They stand for whatever the library does not know, and tell where it acts.
 """
@@ -12,7 +12,7 @@ from core.gap.result import Place
 from core.gap.sim import PRODUCTS, Part, Slot
 from core.geometry import Array
 
-JOINT, SENSE, TURN, TIME = "?joint", "?sense", "?turn", "?time"
+JOINT, SENSE, SPEED, TURN, TIME = "?joint", "?sense", "?speed", "?turn", "?time"
 CONFIGURATION, ROOM, LOAD = "?configuration", "?room", "?load"
 BUMPS, TIME_BUMPS, WAVES = 9, 11, 24
 SEED = 3
@@ -25,6 +25,9 @@ def nameless(doings: Doings) -> list[Candidate]:
     out = [_joint(doings, j) for j in motors(doings)]
     if doings.past.complete:
         out += [_sense(doings, j) for j in motors(doings)]
+    if doings.speed is not None:
+        fastest = np.abs(doings.speed).max(axis=0)
+        out += [_speed(doings, j, float(fastest[j])) for j in motors(doings) if fastest[j] > 0]
     out += [_turn(doings, j) for j in motors(doings)]
     if np.ptp(doings.seen.payload_kg) > 0:
         out.append(_load(doings))
@@ -59,6 +62,18 @@ def _sense(doings: Doings, joint: int) -> Candidate:
 
     names = tuple(f"bump_{b}" for b in range(BUMPS))
     return Candidate(Place(SENSE, joint=joint + 1), "", names, columns, 1, (ANGLE,) * BUMPS)
+
+
+def _speed(doings: Doings, joint: int, fastest: float) -> Candidate:
+    low, high = doings.active[:, joint].min(), doings.active[:, joint].max()
+
+    def columns(doings: Doings) -> list[Column]:
+        share = np.zeros(doings.count) if doings.speed is None else doings.speed[:, joint] / fastest
+        bumps = share[:, None] * _bumps(doings.active[:, joint], low, high, BUMPS)
+        return [drive(doings, joint, bumps[:, b]) for b in range(BUMPS)]
+
+    names = tuple(f"bump_{b}" for b in range(BUMPS))
+    return Candidate(Place(SPEED, joint=joint + 1), "", names, columns, 1, (ANGLE,) * BUMPS)
 
 
 def _time() -> Candidate:
