@@ -122,10 +122,16 @@ def _is(one: Own, direction: Array) -> bool:
 
 def _weightless(one: Own) -> bool:
     """Whether what bends the most bends under what is carried alone."""
-    moved = dict(zip(one.candidate.names, one.numbers**2 * np.diag(one.square), strict=True))
+    names = one.candidate.names
+    moved = dict(zip(names, one.numbers**2 * np.diag(one.square), strict=True))
     most = max((name for name in moved if name.startswith("give_")), key=lambda name: moved[name])
-    give = one.values[most]
-    return abs(one.values.get(f"own_weight_{most}", 0.0) + give) < UNWEIGHED * abs(give)
+    give, own_weight, link_weight = one.values[most], f"own_weight_{most}", f"link_weight_{most}"
+    itself = give + one.values.get(own_weight, 0.0)
+    if link_weight in names:
+        # What lies beyond a link and the link itself hang on it alike: one may stand in for the other.
+        own, link = (one.square[k, k] / one.scale[k] ** 2 for k in map(names.index, (own_weight, link_weight)))
+        itself += one.values[link_weight] * np.sqrt(link / max(own, 1e-300))
+    return bool(abs(itself) < UNWEIGHED * abs(give))
 
 
 def gives_at_one_joint(one: Own) -> bool:

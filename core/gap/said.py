@@ -132,7 +132,9 @@ class Said:
             return None
         if judge.open.square_m2(joined(chosen_of(several), judge.found)) < AT_FLOOR * judge.floor_m2:
             return None
-        left = {variable: judge.open.square_m2(chosen) for variable, chosen in judge.local.items()}
+        most = max(self._evidence(variable) for variable in judge.local)
+        likely = [variable for variable in judge.local if self._evidence(variable) >= ONE_JOINT * most]
+        left = {variable: judge.open.square_m2(judge.local[variable]) for variable in likely}
         best = min(left, key=left.__getitem__)
         if judge.open.square_m2(chosen_of(several)) < left[best]:
             return None
