@@ -214,9 +214,17 @@ def stands(judge: Judge) -> list[Stand]:
 
 def _worthy(judge: Judge) -> Chosen:
     """What the data say much for, and what moves much: placement and geometry hide that from the evidence."""
-    whole, found = judge.square(judge.found), judge.found
+    whole, found, least = judge.square(judge.found), judge.found, MOVES * judge.closable_m2
     lost = [judge.square(found.without(k)) - whole for k in range(len(found.groups))]
-    return joined(judge.worth, _pick(found, [k for k, m2 in enumerate(lost) if m2 > MOVES * judge.closable_m2]))
+    worth = joined(judge.worth, _pick(found, [k for k, m2 in enumerate(lost) if m2 > least]))
+    while rest := [k for k, group in enumerate(found.groups) if group not in worth.groups]:
+        # What several small ones do together may hide what one of them closes beside the great.
+        left = [judge.square(joined(worth, _pick(found, [k]))) for k in rest]
+        best = int(np.argmin(left))
+        if judge.square(worth) - left[best] <= least:
+            break
+        worth = joined(worth, _pick(found, [rest[best]]))
+    return worth
 
 
 def _others(judge: Judge, variable: str, kept: Chosen) -> tuple[Chosen, Chosen]:
