@@ -26,7 +26,7 @@ NAMED_AT, NAMED_WIDTH = 0.93, 0.012
 CLOSES_AT, CLOSES_WIDTH = 0.82, 0.03
 """Share of the gap beyond the floor that names close together at which they are as likely wrong as right: where they
 leave more, something without a name is at work and they stand in for it. From simulated worlds with known causes."""
-LEAST, MOST = 0.4, 0.98
+LEAST, MOST = 0.4, 0.99
 """However badly or well names close, so often they are right in those worlds."""
 BESIDE_UNKNOWN = 0.4
 """How much less a name is worth that is told after something without a name."""
