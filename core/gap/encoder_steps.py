@@ -24,6 +24,9 @@ SHARES = (0.5, 1.6)
 STEPS_AROUND, ALIKE_AROUND = 41, 61
 PHASES_AROUND = 17
 PHASES = tuple(float(phase) for phase in np.arange(8) / 8)
+FINE_PHASES, FINE_SIZES, ROUNDS, NARROWER = np.arange(32) / 32, 25, 2, 10.0
+"""Size and phase hang together: of thousands of teeth the last ones move by one where the size is off by less than a
+thousandth. So both are tried together in the end, and again within a narrower range."""
 
 
 def encoder_steps(sim: Sim, doings: Doings, aims_m: Sequence[Array], weight: Array) -> list[Candidate]:
@@ -155,7 +158,10 @@ class Spectrum:
             return None
         places = _whole_steps(self.stops.wave, self.power, self.amplitude, MOST_TRIED)
         best = max((self.saw_near(1 / self.stops.wave[k]) for k in places), default=(0.0, 0.0))
-        return (best[1], self.sharp_phase(best[1])) if best[0] > 0 else None
+        if best[0] <= 0:
+            return None
+        step = sharp_size([self], best[1])
+        return step, self.sharp_phase(step)
 
     def saw_near(self, step: float) -> tuple[float, float]:
         """The best explained energy near a size of steps, and the size."""
@@ -191,6 +197,16 @@ class Spectrum:
         return np.where(whole, pull**2 / square, 0.0)
 
 
+def sharp_size(spectra: Sequence[Spectrum], step: float) -> float:
+    """The size near a size at which steps, each joint's at their best phase, explain most."""
+    width = step**2 / min(spectrum.stops.span for spectrum in spectra) / 2
+    for _ in range(ROUNDS):
+        sizes = step + width * np.linspace(-1, 1, FINE_SIZES)
+        energy = [sum(one.explained(np.full(len(FINE_PHASES), s), FINE_PHASES).max() for one in spectra) for s in sizes]
+        step, width = float(sizes[int(np.argmax(energy))]), width / NARROWER
+    return step
+
+
 def _whole_steps(wave: Array, power: Array, amplitude: Array, most: int) -> np.ndarray:
     """The wave that stands out most, and such as do nearly so and have the amplitude of whole steps of their length.
 
@@ -214,7 +230,7 @@ def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | No
     amplitude = np.average(amplitudes, axis=0, weights=strengths)
     found = _whole_steps(waves, total, amplitude, MOST_TRIED_ALIKE)
     best = max((_alike_near(spectra, 1 / waves[k]) for k in found), default=(0.0, 0.0))
-    return _alike(spectra, best[1]) if best[0] > 0 else None
+    return _alike(spectra, sharp_size(spectra, best[1])) if best[0] > 0 else None
 
 
 def _alike(spectra: list[Spectrum], size: float) -> dict[int, tuple[float, float]]:
