@@ -97,7 +97,7 @@ class NoiseFound:
         before = float(np.trace(stated, axis1=1, axis2=2).mean())
         covariance = _rescaled(stated, used / before)
         scaled = whitening(covariance, np.ones(seen.count)).rows(left_m)
-        weight = _fitted(seen).astype(float)
+        weight = seen.fitted.astype(float)
         # What a fit misses everywhere makes no outliers.
         scaled /= np.sqrt(max(noise_found.robust_variance(scaled[weight > 0]), 1.0))
         outlying = np.flatnonzero((weight > 0) & (np.abs(scaled).max(axis=1) > noise_found.OUTLYING))
@@ -106,11 +106,6 @@ class NoiseFound:
         weight[inlying] *= noise_found.student_weights(scaled[inlying], self.tails)
         floors = np.trace(_rescaled(stated, floor / before), axis1=1, axis2=2)
         return replace(self, covariance_m2=covariance, floor_m2=floors, outliers=outlying, weight=weight)
-
-
-def _fitted(seen: Observations) -> np.ndarray:
-    """Points that may be fitted, (m,): all but the owner's validation rows, unless there is nothing else."""
-    return ~seen.check if (~seen.check).any() else np.ones(seen.count, dtype=bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +182,7 @@ def analyse(
         without: effects that the library shall not know.
         told: which named candidates are looked at; None: all.
     """
-    base_weight = _fitted(seen).astype(float)
+    base_weight = seen.fitted.astype(float)
     progress(0.02, "placing base and targets")
     covariance = seen.stated_covariance_m2
     sim = placed = place(seen, base_weight / np.trace(covariance, axis1=1, axis2=2))

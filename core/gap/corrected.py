@@ -60,7 +60,7 @@ class CorrectedSim:
         sim, motions = place(seen, weight), self.motions(seen)
         slots = placement_slots(seen)
         for _ in range(ROUNDS if slots else 0):
-            fields = sim.fields(slots)
+            fields = sim.placed_fields(slots, motions)
             square = np.einsum("mck,m,mcl->kl", fields, weight, fields, optimize=True)
             pull = np.einsum("mck,m,mc->k", fields, weight, seen.point_m - sim.moved_m(motions), optimize=True)
             square += 1e-9 * np.trace(square) / len(square) * np.eye(len(square))
@@ -86,5 +86,4 @@ def realised_closure(report: Diagnosis, fresh: Campaign) -> float:
 
 
 def _weights(seen: Observations) -> Array:
-    fitted = ~seen.check if (~seen.check).any() else np.ones(seen.count, dtype=bool)
-    return fitted / np.trace(seen.stated_covariance_m2, axis1=1, axis2=2)
+    return seen.fitted / np.trace(seen.stated_covariance_m2, axis1=1, axis2=2)

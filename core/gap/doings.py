@@ -5,10 +5,13 @@ from functools import cached_property
 
 import numpy as np
 
-from core.gap.history import History, drive_load, history, motors_of
+from core.gap.history import History, drive_load, history, motors_of, running
 from core.gap.loads import Loads, loads
 from core.gap.observations import Observations
 from core.geometry import Array
+
+PAUSE_S, PAUSE_STEPS = 600.0, 10.0
+"""An arm rests where more time passes from one record to the next, and so many times what mostly passes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +109,28 @@ class Doings:
         table = self.seen.campaign.measurements
         time = self.logged("time_s")
         return None if time is None else time - np.nanmin(table.time_s)
+
+    @cached_property
+    def _clock(self) -> tuple[np.ndarray, Array, Array]:
+        """Records that have a time, in their order, and how much time each took, at work and at rest, s, (w,) each."""
+        table = self.seen.campaign.measurements
+        timed = np.flatnonzero(np.isfinite(table.time_s))
+        order = timed[np.argsort(table.record[timed], kind="stable")]
+        took = np.maximum(np.diff(table.time_s[order], prepend=table.time_s[order[:1]]), 0.0)
+        rested = took > max(PAUSE_S, PAUSE_STEPS * float(np.median(took)))
+        return table.record[order], np.where(rested, 0.0, took), np.where(rested, took, 0.0)
+
+    @property
+    def rested(self) -> bool:
+        """Whether the arm stood idle between records long enough to cool."""
+        return self.elapsed_s is not None and bool(self._clock[2].any())
+
+    def warmth(self, constant_s: float) -> Array:
+        """How warm work has made the arm at every point, 0 cold to 1, (m,): it warms as it works and cools at rest."""
+        record, worked, rested = self._clock
+        kept = np.exp(-(worked + rested) / constant_s)
+        warm = running(kept, np.where(rested > 0, 0.0, 1.0 - kept))
+        return warm[np.searchsorted(record, self.seen.record)]
 
 
 def doings(seen: Observations) -> Doings:

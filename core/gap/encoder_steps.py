@@ -9,8 +9,10 @@ import numpy as np
 from core.gap.doings import Doings
 from core.gap.effects import drives
 from core.gap.effects.candidate import Candidate, motors
+from core.gap.effects.drives import EncoderSteps
 from core.gap.library import joint_alone
 from core.gap.sim import Part, Sim, Slot
+from core.gap.step_edges import PHASES, JointErrors, settled
 from core.geometry import Array
 
 COARSEST_STEP_RAD, COARSEST_STEP_M = 0.06, 0.02
@@ -20,11 +22,11 @@ PEAK = 20.0
 """A line of the spectrum must stand so many times above its neighbourhood."""
 ALIKE, MOST_TRIED, MOST_TRIED_ALIKE = 0.8, 6, 3
 """Waves of at least so much of the greatest power may be the steps', as many of them are tried."""
-SHARES = (0.5, 1.6)
 STEPS_AROUND, ALIKE_AROUND = 41, 61
-PHASES_AROUND = 17
-PHASES = tuple(float(phase) for phase in np.arange(8) / 8)
-FINE_PHASES, FINE_SIZES, ROUNDS, NARROWER = np.arange(32) / 32, 25, 2, 10.0
+TANGLED = 2
+"""Times that the steps of several joints are found each in what the others leave."""
+FEW_PHASES = np.arange(8) / 8
+FINE_SIZES, ROUNDS, NARROWER = 25, 2, 10.0
 """Size and phase hang together: of thousands of teeth the last ones move by one where the size is off by less than a
 thousandth. So both are tried together in the end, and again within a narrower range."""
 
@@ -38,8 +40,65 @@ def encoder_steps(sim: Sim, doings: Doings, aims_m: Sequence[Array], weight: Arr
     """
     out = _steps_of(sim, doings, Part.DRIVE, aims_m, weight)
     if doings.seen.chain.coupling_gains.any():
-        out += [joint_alone(one) for one in _steps_of(sim, doings.uncoupled, Part.JOINT, aims_m, weight)]
+        out += _steps_of(sim, doings.uncoupled, Part.JOINT, aims_m, weight)
     return out
+
+
+def settled_steps(sim: Sim, doings: Doings, candidate: EncoderSteps, aim_m: Array, weight: Array) -> EncoderSteps:
+    """The same steps with sizes and phases as all points tell them that nothing else explains.
+
+    Args:
+        aim_m: residuals after everything that was fitted but these steps, (m, 3).
+        weight: of each point, 1/m^2, (m,); 0: not looked at.
+    """
+    alone = candidate.columns(doings)[0][0][0].part is Part.JOINT
+    told = doings.uncoupled if alone else doings
+    fields = {j: sim.fields([Slot(Part.JOINT if alone else Part.DRIVE, j)])[:, :, 0] for j in candidate.steps}
+    found = drives.quantisation(told, _untangled(told, fields, aim_m, candidate.steps, weight))
+    return joint_alone(found) if alone else found
+
+
+def _untangled(
+    told: Doings, fields: dict[int, Array], aim_m: Array, steps: dict[int, tuple[float, float]], weight: Array
+) -> dict[int, tuple[float, float]]:
+    """Steps of several joints, each found anew in what the others leave: the strongest first."""
+    left_m, there = aim_m.copy(), {}
+    errors = {j: _errors(told, j, fields[j], aim_m, weight).within(steps[j][0]) for j in steps}
+    strongest = sorted(steps, key=lambda j: -errors[j].energy(*steps[j]))
+    for j in strongest * TANGLED:
+        left_m += there.pop(j, 0.0)
+        errors = _errors(told, j, fields[j], left_m, weight).within(steps[j][0])
+        phase = errors.sharp_phase(steps[j][0])
+        if errors.energy(steps[j][0], phase) > 0:
+            steps = steps | {j: (steps[j][0], phase)}
+            there[j] = _moved_m(told, fields[j], j, steps[j])
+            left_m -= there[j]
+    return _settled(told, fields, {j: left_m + there.get(j, 0.0) for j in steps}, steps, weight)
+
+
+def _settled(
+    told: Doings,
+    fields: dict[int, Array],
+    aims_m: dict[int, Array],
+    steps: dict[int, tuple[float, float]],
+    weight: Array,
+) -> dict[int, tuple[float, float]]:
+    """Steps settled by what each joint's have to explain; of one size stay of one size."""
+    errors = {j: _errors(told, j, fields[j], aims_m[j], weight).within(steps[j][0]) for j in steps}
+    out = {}
+    for size in dict.fromkeys(size for size, _ in steps.values()):
+        same = [j for j in steps if steps[j][0] == size]
+        anew, phases = settled([errors[j] for j in same], size, [steps[j][1] for j in same])
+        out |= {j: (anew, phase) for j, phase in zip(same, phases, strict=True)}
+    return {j: out[j] for j in steps}
+
+
+def _errors(told: Doings, joint: int, field: Array, aim_m: Array, weight: Array) -> JointErrors:
+    return JointErrors(told.active[:, joint], weight * np.sum(field**2, axis=1), weight * np.sum(field * aim_m, axis=1))
+
+
+def _moved_m(told: Doings, field: Array, joint: int, steps: tuple[float, float]) -> Array:
+    return field * drives.saw(told.active[:, joint], *steps)[:, None]
 
 
 def _steps_of(sim: Sim, doings: Doings, part: Part, aims_m: Sequence[Array], weight: Array) -> list[Candidate]:
@@ -53,8 +112,12 @@ def _steps_of(sim: Sim, doings: Doings, part: Part, aims_m: Sequence[Array], wei
     found = []
     for aim_m in aims_m:
         spectra = [Spectrum(stops, weight * np.sum(field * aim_m, axis=1)) for stops, field in seen]
-        found += [drives.quantisation(doings, steps) for steps in _in_spectra(spectra)]
-    return found
+        fields = {stops.joint: field for stops, field in seen}
+        for steps in _in_spectra(spectra):
+            if len(steps) > 1:
+                steps = _untangled(doings, {j: fields[j] for j in steps}, aim_m, steps, weight)
+            found.append(drives.quantisation(doings, steps))
+    return [joint_alone(one) for one in found] if part is Part.JOINT else found
 
 
 def _in_spectra(spectra: Sequence["Spectrum"]) -> list[dict[int, tuple[float, float]]]:
@@ -132,6 +195,10 @@ class Spectrum:
     """Weighted joint errors, (m,)."""
 
     @cached_property
+    def errors(self) -> JointErrors:
+        return JointErrors(self.stops.x, self.stops.strength, self.error)
+
+    @cached_property
     def _pull(self) -> Array:
         # What is constant in errors, placement has taken up.
         return self.stops.waves(self.error)[: len(self.stops.wave)] - self.error.sum() * self.stops.weighed
@@ -161,7 +228,7 @@ class Spectrum:
         if best[0] <= 0:
             return None
         step = sharp_size([self], best[1])
-        return step, self.sharp_phase(step)
+        return step, self.errors.sharp_phase(step)
 
     def saw_near(self, step: float) -> tuple[float, float]:
         """The best explained energy near a size of steps, and the size."""
@@ -172,29 +239,8 @@ class Spectrum:
 
     def best_energy(self, sizes: Array) -> Array:
         """Energy that steps of each size (k,) explain at their best phase, (k,)."""
-        energy = self.explained(np.repeat(sizes, len(PHASES)), np.tile(PHASES, len(sizes)))
+        energy = self.errors.explained(np.repeat(sizes, len(FEW_PHASES)), np.tile(FEW_PHASES, len(sizes)))
         return energy.reshape(len(sizes), -1).max(axis=1)
-
-    def sharp_phase(self, step: float) -> float:
-        """The best phase of steps of a size, as finely as points can tell."""
-        phases, width = np.array(PHASES), 1 / len(PHASES)
-        for _ in range(3):
-            best = phases[int(np.argmax(self.explained(np.full(len(phases), step), phases)))]
-            phases = np.append(best, best + width * np.linspace(-1, 1, PHASES_AROUND))
-            width /= 8
-        return float(best)
-
-    def explained(self, steps: Array, phases: Array) -> Array:
-        """Energy that steps of each size and phase (k,) explain; 0 where a share of them does that is far from one.
-
-        Such a share of other steps may look alike at the few places where a joint stood, and is none.
-        """
-        teeth = drives.saw(self.stops.x, steps[:, None], phases[:, None])
-        strength = self.stops.strength
-        teeth -= (teeth @ strength / strength.sum())[:, None]
-        pull, square = teeth @ self.error, np.maximum(teeth**2 @ strength, 1e-300)
-        whole = (pull / square > SHARES[0]) & (pull / square < SHARES[1])
-        return np.where(whole, pull**2 / square, 0.0)
 
 
 def sharp_size(spectra: Sequence[Spectrum], step: float) -> float:
@@ -202,7 +248,7 @@ def sharp_size(spectra: Sequence[Spectrum], step: float) -> float:
     width = step**2 / min(spectrum.stops.span for spectrum in spectra) / 2
     for _ in range(ROUNDS):
         sizes = step + width * np.linspace(-1, 1, FINE_SIZES)
-        energy = [sum(one.explained(np.full(len(FINE_PHASES), s), FINE_PHASES).max() for one in spectra) for s in sizes]
+        energy = [sum(one.errors.explained(np.full(len(PHASES), s), PHASES).max() for one in spectra) for s in sizes]
         step, width = float(sizes[int(np.argmax(energy))]), width / NARROWER
     return step
 
@@ -235,7 +281,7 @@ def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | No
 
 def _alike(spectra: list[Spectrum], size: float) -> dict[int, tuple[float, float]]:
     """Steps of one size for all, at the best phase of each."""
-    return {spectrum.stops.joint: (size, spectrum.sharp_phase(size)) for spectrum in spectra}
+    return {spectrum.stops.joint: (size, spectrum.errors.sharp_phase(size)) for spectrum in spectra}
 
 
 def _alike_near(spectra: list[Spectrum], step: float) -> tuple[float, float]:

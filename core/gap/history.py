@@ -54,6 +54,16 @@ class History:
         before = np.where(turned, gone - np.abs(self.step), -1.0)
         return gone - np.maximum(np.maximum.accumulate(before, axis=0), 0.0)
 
+    def dragged(self, joint: int, way: float) -> Array:
+        """How far a joint trails its motor at each point of the gap, -1 to 1, (m,), where that builds up along a way.
+
+        Every motion takes it nearer to the side it comes from, by the share 1 - exp(-|motion| / way), and short
+        reversals take back but a part of it (Dahl 1968, a solid friction model). Joints count from 0; way in rad or m.
+        """
+        step = self.step[:, joint]
+        kept = np.exp(-np.abs(step) / way)
+        return running(kept, np.sign(step) * (1.0 - kept))[self.last]
+
     @cached_property
     def _between(self) -> tuple[Array, Array]:
         """Loads that turn each motor at places on the way to each record, (w, steps, n), and the senses of motion."""
@@ -132,6 +142,16 @@ def drive_load(seen: Observations, found: Loads, payload_kg: Array) -> Array:
     held = on_joints.copy()
     held[:, :-1] += seen.chain.coupling_gains[1:] * on_joints[:, 1:]
     return held
+
+
+def running(kept: Array, added: Array) -> Array:
+    """x_k = kept_k x_{k-1} + added_k from x = 0, (w,), by doubling the stretch that is summed up."""
+    kept, out, stretch = kept.copy(), added.copy(), 1
+    while stretch < len(out):
+        out[stretch:] = out[stretch:] + kept[stretch:] * out[:-stretch]
+        kept[stretch:] = kept[stretch:] * kept[:-stretch]
+        stretch *= 2
+    return out
 
 
 def _last_event(event: Array) -> Array:

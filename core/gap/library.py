@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from core.gap.doings import Doings
-from core.gap.effects import drives, elastic, instrument, lost_motion, structure
+from core.gap.effects import drives, elastic, instrument, lost_motion, structure, thermal
 from core.gap.effects.candidate import Candidate, Column
 from core.gap.effects.nameless import nameless
 from core.gap.sim import Part, Slot
@@ -40,7 +40,7 @@ FAMILIES = (
     elastic.payloads,
     structure.geometries,
     structure.wobbles,
-    structure.thermals,
+    thermal.thermals,
     instrument.drifts,
     instrument.base_shifts,
     instrument.target_slips,

@@ -59,6 +59,11 @@ class Observations:
         return None if points is None else points[self.rows]
 
     @cached_property
+    def fitted(self) -> np.ndarray:
+        """Points that may be fitted, (m,): all but the owner's validation rows, unless there is nothing else."""
+        return ~self.check if (~self.check).any() else np.ones(self.count, dtype=bool)
+
+    @cached_property
     def target(self) -> np.ndarray:
         return self.campaign.measurements.target[self.rows]
 

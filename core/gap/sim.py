@@ -158,6 +158,27 @@ class Sim:
                 out = out + value[:, None] * self._bent(slot, points)
         return out
 
+    def placed_fields(self, slots: list[Slot], motions: dict[Slot, Array]) -> Array:
+        """Derivative of the moved points with respect to where base and targets are, (m, 3, slots).
+
+        Points go with their targets as the moved links turn, which tells heights that parallel axes do not.
+        """
+        fields = self.fields(slots)
+        if self.seen.simulated_m is not None:
+            return fields
+        moved = self.moved_m(motions)
+        turned = [self._shifted(axis).moved_m(motions) - moved for axis in range(3)]
+        for k, slot in enumerate(slots):
+            if slot.part is Part.TARGET:
+                fields[:, :, k] = np.where((self.seen.target == slot.index)[:, None], turned[slot.axis], 0.0)
+            elif slot.part is Part.BASE and slot.axis < 3:
+                fields[:, :, k] = cross(np.broadcast_to(np.eye(3)[slot.axis], moved.shape), moved - self.middle_m)
+        return fields
+
+    def _shifted(self, axis: int) -> "Sim":
+        """The same sim with all targets one metre farther along an axis of their links: points go in proportion."""
+        return replace(self, target_m=self.target_m + np.eye(3)[axis])
+
     def _placed_points(self) -> Array:
         placed = self.simulated_to_instrument
         return self.seen.simulated_m if placed is None else apply(placed, self.seen.simulated_m)

@@ -14,6 +14,7 @@ from core.gap.doings import Doings, doings
 from core.gap.effects import drives, instrument
 from core.gap.effects.candidate import Candidate
 from core.gap.effects.elastic import beam_axes
+from core.gap.effects.thermal import thermals
 from core.gap.library import candidates
 from core.gap.sim import Sim
 from core.geometry import Array, apply, invert
@@ -194,6 +195,8 @@ class TestDrives:
         """A loss of 20 that is 15 less right after a reversal and grows by 5 at full load."""
         _, told, _ = world(name)
         for one in of(name, "hysteresis"):
+            if one.atom != "lost at once":
+                continue
             j = one.place.joint - 1
             way = 0.015 if world(name)[0].seen.chain.sliding[j] else 0.15
             names = [f"not_yet_after_{1e3 * way:g}" in n for n in one.names]
@@ -204,6 +207,18 @@ class TestDrives:
                 numbers[-1] = 0.005
                 loss += 0.005 * np.abs(told.drive_load[:, j]) / np.abs(told.drive_load[:, j]).max()
             same(moved(name, one, numbers), with_motors(name, one.place.joint, -0.5 * told.sense[:, j] * loss))
+
+    def test_hysteresis_that_is_given_back(self, name: str) -> None:
+        """A joint that a spring with friction holds: half the loss times how far it trails."""
+        _, told, _ = world(name)
+        found = [one for one in of(name, "hysteresis") if one.atom == "given back along the way"]
+        assert found
+        for one in found:
+            j = one.place.joint - 1
+            way = 0.015 if world(name)[0].seen.chain.sliding[j] else 0.15
+            numbers = np.where([f"not_yet_after_{1e3 * way:g}" in n for n in one.names], -0.04, 0.0)
+            numbers[0] = 0.02
+            same(moved(name, one, numbers), with_motors(name, one.place.joint, -0.01 * told.past.dragged(j, way)))
 
     def test_compliance(self, name: str) -> None:
         _, told, _ = world(name)
@@ -435,6 +450,18 @@ class TestStructure:
             law = 1 - np.exp(-told.elapsed_s / 60 / minutes)
             ratio = one.columns(told)[0][0][1][1:] / law[1:]
             np.testing.assert_allclose(ratio, ratio[-1], rtol=0.02)
+
+    def test_an_arm_that_rests_may_cool(self, name: str) -> None:
+        sim, _, _ = world(name)
+        rows = sim.seen.campaign.measurements
+        late = replace(rows, time_s=rows.time_s + np.where(rows.record > 20, 5400.0, 0.0))
+        rested = doings(replace(sim.seen, campaign=replace(sim.seen.campaign, measurements=late)))
+        found = [c for c in thermals(rested) if c.place.joint is None and c.atom.startswith("warming")]
+        assert sorted(c.atom.endswith("of work") for c in found) == [False] * 3 + [True] * 3
+        for one in found:
+            rise = one.columns(rested)[0][0][1]
+            cools = np.abs(rise[rested.seen.record == 21]) < np.abs(rise[rested.seen.record == 20])
+            assert cools.all() == one.atom.endswith("of work")
 
 
 @pytest.mark.parametrize("name", [TURNING, SLIDING])

@@ -171,3 +171,60 @@ def test_a_part_of_the_points_keeps_its_whole_past(name: str) -> None:
     np.testing.assert_array_equal(part.sense, told.sense[keep])
     np.testing.assert_array_equal(part.travel, told.travel[keep])
     np.testing.assert_array_equal(part.past.flank(1, 3.0), told.past.flank(1, 3.0)[keep])
+
+
+class TestDragged:
+    """A joint trails its motor by what a spring with friction holds (Dahl's model), step by step."""
+
+    @staticmethod
+    def by_hand(places: Array, way: float) -> list[float]:
+        behind, out = 0.0, []
+        for step in np.diff(places, prepend=places[0]):
+            side = np.sign(step)
+            behind = side + (behind - side) * np.exp(-abs(step) / way)
+            out.append(behind)
+        return out
+
+    @pytest.mark.parametrize("way", [0.01, 0.15, 2.0])
+    def test_step_by_step(self, way: float) -> None:
+        places = np.random.default_rng(4).normal(0.0, 0.2, 97).cumsum()
+        told = path(crane(), swing(*places))
+        np.testing.assert_allclose(told.past.dragged(0, way), self.by_hand(places, way), atol=1e-12)
+        assert np.abs(told.past.dragged(1, way)).max() == 0
+
+    def test_a_short_reversal_takes_back_a_part(self) -> None:
+        told = path(crane(), swing(0.0, 1.0, 0.95, 1.0))
+        behind = told.past.dragged(0, 0.1)
+        assert behind[1] == pytest.approx(1, abs=1e-4)
+        assert 0.1 < behind[2] < 0.3
+        assert behind[2] < behind[3] < behind[1]
+
+    def test_far_beyond_a_reversal_it_is_what_travel_says(self) -> None:
+        told = path(crane(), swing(0.0, 3.0, *np.linspace(2.9, 2.0, 10)))
+        expected = told.sense[:, 0] * (1 - 2 * np.exp(-told.travel[:, 0] / 0.2))
+        np.testing.assert_allclose(told.past.dragged(0, 0.2)[2:], expected[2:], atol=1e-5)
+
+
+class TestWarmth:
+    """Warm by work, cold by rest; times are what the records say."""
+
+    def test_without_a_rest_it_is_what_time_makes(self) -> None:
+        told = path(crane(), swing(*np.linspace(0, 1, 30)), time_s=20.0 * np.arange(30))
+        assert not told.rested
+        np.testing.assert_allclose(told.warmth(300.0), 1 - np.exp(-20.0 * np.arange(30) / 300.0), atol=1e-12)
+
+    def test_a_rest_cools(self) -> None:
+        time_s = np.concatenate([20.0 * np.arange(20), 380.0 + 1500.0 + 20.0 * np.arange(20)])
+        told = path(crane(), swing(*np.linspace(0, 1, 40)), time_s=time_s)
+        assert told.rested
+        warm = told.warmth(600.0)
+        assert warm[19] == pytest.approx(1 - np.exp(-380 / 600))
+        assert warm[20] == pytest.approx(warm[19] * np.exp(-1500 / 600))
+        assert (np.diff(warm[20:]) > 0).all()
+
+    def test_passed_records_are_work_too(self) -> None:
+        """Half an hour of moves between two points is no rest."""
+        time_s = 60.0 * np.arange(40)
+        told = path(crane(), swing(*np.linspace(0, 1, 40)), measured=[0, 39], time_s=time_s)
+        assert not told.rested
+        assert told.warmth(900.0)[-1] == pytest.approx(1 - np.exp(-39 * 60 / 900))

@@ -156,3 +156,17 @@ def test_a_part_of_the_points_is_the_same_sim() -> None:
     slots = all_slots(sim)
     np.testing.assert_array_equal(sim.part(keep).points_m(), sim.points_m()[keep])
     np.testing.assert_array_equal(sim.part(keep).fields(slots), sim.fields(slots)[keep])
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_where_base_and_targets_are_answers_through_the_moved_chain(name: str) -> None:
+    """A link that leans carries a higher target aside: derivatives at the nominal chain do not know it."""
+    sim = random_sim(ARMS[name](3), 3, 24)
+    parts = (Part.JOINT, Part.DRIVE, Part.AXIS, Part.LINK, Part.BEYOND)
+    motions = {slot: value for slot, value in large_motions(sim, 3).items() if slot.part in parts}
+    slots = placement_slots(sim.seen)
+    found = sim.placed_fields(slots, motions)
+    # The base is placed about the middle of the measured points, so both sides of a difference turn about it.
+    for k, slot in enumerate(slots):
+        ends = [with_placement(sim, slots, sign * STEP * np.eye(len(slots))[k]).moved_m(motions) for sign in (1, -1)]
+        np.testing.assert_allclose(found[:, :, k], (ends[0] - ends[1]) / (2 * STEP), atol=1e-7, err_msg=str(slot))

@@ -190,7 +190,7 @@ def quantisation(doings: Doings, steps: dict[int, tuple[float, float]]) -> Encod
         return [[(Slot(Part.DRIVE, j), saw(doings.active[:, j], *one)) for j, one in steps.items()]]
 
     fixed = tuple((f"step_of_joint_{j + 1}_{unit(doings, j)}", one[0]) for j, one in steps.items())
-    said = ", ".join(f"{one[0]:.4g} {unit(doings, j)}" for j, one in steps.items())
+    said = ", ".join(f"{one[0]:.8g} {unit(doings, j)} from {one[1]:.3f} of one" for j, one in steps.items())
     joint = next(iter(steps)) + 1 if len(steps) == 1 else None
     return EncoderSteps(
         Place("quantisation", joint=joint), f"steps of {said}", ("share_1",), columns, 200, (1.0,), fixed, steps

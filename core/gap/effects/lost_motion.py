@@ -31,8 +31,13 @@ def backlashes(doings: Doings) -> list[Candidate]:
 
 
 def hystereses(doings: Doings) -> list[Candidate]:
-    """A loss that grows with the way since the motor turned round, and with the load."""
-    return [_hysteresis(doings, j) for j in motors(doings)] if doings.past.complete else []
+    """A loss that grows with the way since the motor turned round, and with the load.
+
+    What was built up before is lost as the motor turns, or it is given back along the way (``gives_back``).
+    """
+    if not doings.past.complete:
+        return []
+    return [_hysteresis(doings, j, gives_back) for j in motors(doings) for gives_back in (False, True)]
 
 
 def _backlash(doings: Doings, joint: int, friction: float, choices: int) -> Candidate:
@@ -52,16 +57,23 @@ def _backlash(doings: Doings, joint: int, friction: float, choices: int) -> Cand
     return Candidate(Place("backlash", joint=joint + 1), atom, names, columns, choices, (ANGLE,) * len(names))
 
 
-def _hysteresis(doings: Doings, joint: int) -> Candidate:
+def _hysteresis(doings: Doings, joint: int, gives_back: bool) -> Candidate:
     of = unit(doings, joint)
     ways = BUILD_UP_M if of == "m" else BUILD_UP_RAD
     heavy = 0.0 if doings.drive_load is None else float(np.abs(doings.drive_load[:, joint]).max())
     began = bool((doings.sense[:, joint] == 0).any())
 
+    def not_yet(doings: Doings, way: float) -> Array:
+        sense = doings.sense[:, joint]
+        if gives_back:
+            # Half of it after a long way on the other side: there it is what the other form says.
+            return (sense - doings.past.dragged(joint, way)) / 2
+        return sense * np.exp(-doings.travel[:, joint] / way)
+
     def columns(doings: Doings) -> list[Column]:
-        sense, travel = doings.sense[:, joint], doings.travel[:, joint]
+        sense = doings.sense[:, joint]
         out = [drive(doings, joint, -sense / 2)]
-        out += [drive(doings, joint, -sense / 2 * np.exp(-travel / way)) for way in ways]
+        out += [drive(doings, joint, -not_yet(doings, way) / 2) for way in ways]
         if heavy > LEAST_LOAD and doings.drive_load is not None:
             out.append(drive(doings, joint, -sense / 2 * np.abs(doings.drive_load[:, joint]) / heavy))
         return [*out, drive(doings, joint, (sense == 0).astype(float))] if began else out
@@ -70,4 +82,5 @@ def _hysteresis(doings: Doings, joint: int) -> Candidate:
     if heavy > LEAST_LOAD:
         names.append(f"with_load_{of}")
     names += [f"{BEGAN}_{of}"] * began
-    return Candidate(Place("hysteresis", joint=joint + 1), "", tuple(names), columns, 1, (ANGLE,) * len(names))
+    atom = "given back along the way" if gives_back else "lost at once"
+    return Candidate(Place("hysteresis", joint=joint + 1), atom, tuple(names), columns, 2, (ANGLE,) * len(names))
