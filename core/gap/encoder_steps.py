@@ -20,8 +20,10 @@ SPECTRUM_BINS = 1 << 18
 """Over the span of a joint."""
 PEAK = 20.0
 """A line of the spectrum must stand so many times above its neighbourhood."""
-ALIKE, MOST_TRIED, MOST_TRIED_ALIKE = 0.8, 6, 3
-"""Waves of at least so much of the greatest power may be the steps', as many of them are tried."""
+HARMONICS = 6
+"""Of a saw-tooth, which tell steps from what else comes and goes."""
+BESIDE, MOST_TRIED, MOST_TRIED_ALIKE = 6, 6, 3
+"""Waves so near are the same; so many others are tried."""
 STEPS_AROUND, ALIKE_AROUND = 41, 61
 TANGLED = 2
 """Times that the steps of several joints are found each in what the others leave."""
@@ -63,11 +65,11 @@ def _untangled(
 ) -> dict[int, tuple[float, float]]:
     """Steps of several joints, each found anew in what the others leave: the strongest first."""
     left_m, there = aim_m.copy(), {}
-    errors = {j: _errors(told, j, fields[j], aim_m, weight).within(steps[j][0]) for j in steps}
+    errors = {j: _errors(told, j, fields[j], aim_m, weight).within(steps[j][0]).merged for j in steps}
     strongest = sorted(steps, key=lambda j: -errors[j].energy(*steps[j]))
     for j in strongest * TANGLED:
         left_m += there.pop(j, 0.0)
-        errors = _errors(told, j, fields[j], left_m, weight).within(steps[j][0])
+        errors = _errors(told, j, fields[j], left_m, weight).within(steps[j][0]).merged
         phase = errors.sharp_phase(steps[j][0])
         if errors.energy(steps[j][0], phase) > 0:
             steps = steps | {j: (steps[j][0], phase)}
@@ -84,7 +86,7 @@ def _settled(
     weight: Array,
 ) -> dict[int, tuple[float, float]]:
     """Steps settled by what each joint's have to explain; of one size stay of one size."""
-    errors = {j: _errors(told, j, fields[j], aims_m[j], weight).within(steps[j][0]) for j in steps}
+    errors = {j: _errors(told, j, fields[j], aims_m[j], weight).within(steps[j][0]).merged for j in steps}
     out = {}
     for size in dict.fromkeys(size for size, _ in steps.values()):
         same = [j for j in steps if steps[j][0] == size]
@@ -109,20 +111,25 @@ def _steps_of(sim: Sim, doings: Doings, part: Part, aims_m: Sequence[Array], wei
         if strength.max() > 0:
             sliding = bool(doings.seen.chain.sliding[joint])
             seen.append((Stops(joint, sliding, doings.active[:, joint], strength), field))
+    fields = {stops.joint: field for stops, field in seen}
+    each = [
+        [Spectrum(stops, weight * np.sum(fields[stops.joint] * aim_m, axis=1)) for stops, _ in seen] for aim_m in aims_m
+    ]
+    # What stands out where other causes were taken away may be blurred where they were not, and the reverse.
+    waves = [np.unique(np.concatenate([one.likely for one in same])) for same in zip(*each, strict=True)]
     found = []
-    for aim_m in aims_m:
-        spectra = [Spectrum(stops, weight * np.sum(field * aim_m, axis=1)) for stops, field in seen]
-        fields = {stops.joint: field for stops, field in seen}
-        for steps in _in_spectra(spectra):
+    for aim_m, spectra in zip(aims_m, each, strict=True):
+        for steps in _in_spectra(spectra, waves):
             if len(steps) > 1:
                 steps = _untangled(doings, {j: fields[j] for j in steps}, aim_m, steps, weight)
             found.append(drives.quantisation(doings, steps))
     return [joint_alone(one) for one in found] if part is Part.JOINT else found
 
 
-def _in_spectra(spectra: Sequence["Spectrum"]) -> list[dict[int, tuple[float, float]]]:
+def _in_spectra(spectra: Sequence["Spectrum"], waves: Sequence[Array]) -> list[dict[int, tuple[float, float]]]:
     """Steps of one joint after the other, of those together, and of all alike: size and phase by joint."""
-    single = {one.stops.joint: found for one in spectra if (found := one.steps()) is not None}
+    tried = zip(spectra, waves, strict=True)
+    single = {one.stops.joint: found for one, likely in tried if (found := one.steps(likely)) is not None}
     out = [{joint: found} for joint, found in single.items()]
     if len(single) > 1:
         out.append(single)
@@ -176,15 +183,6 @@ class Stops:
         """Sum of the weights times each wave over their sum."""
         return self._weights[: len(self.wave)] / self.strength.sum()
 
-    @cached_property
-    def products(self) -> tuple[Array, Array, Array]:
-        """Weighted squares of cosines and of sines less their means, and their products."""
-        whole, once = float(self.strength.sum()), self.weighed
-        twice = self._weights[: 2 * len(self.wave) : 2]
-        cosines = (whole + twice.real) / 2 - whole * once.real**2
-        sines = (whole - twice.real) / 2 - whole * once.imag**2
-        return cosines, sines, -twice.imag / 2 + whole * once.real * once.imag
-
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -196,7 +194,7 @@ class Spectrum:
 
     @cached_property
     def errors(self) -> JointErrors:
-        return JointErrors(self.stops.x, self.stops.strength, self.error)
+        return JointErrors(self.stops.x, self.stops.strength, self.error).merged
 
     @cached_property
     def _pull(self) -> Array:
@@ -210,21 +208,30 @@ class Spectrum:
         return np.where(self.stops.wave < 1 / self.stops.coarsest, 0.0, power)
 
     @cached_property
-    def amplitude(self) -> Array:
-        """Of each wave when it is fitted to the errors beside a constant, rad or m."""
-        cosines, sines, both = self.stops.products
-        cosine, sine = self._pull.real, -self._pull.imag
-        determinant = np.maximum(cosines * sines - both**2, 1e-6 * float(self.stops.strength.sum()) ** 2)
-        return np.hypot(sines * cosine - both * sine, cosines * sine - both * cosine) / determinant
+    def saw_energy(self) -> Array:
+        """Energy that steps of each wave's length explain at their best phase, in energies of noise.
 
-    def steps(self) -> tuple[float, float] | None:
-        """Size and phase of the steps that stand out; None: none."""
-        if self.stops.span < 4 * self.stops.coarsest / 3:
-            return None
-        if not self.power.max() > PEAK:
-            return None
-        places = _whole_steps(self.stops.wave, self.power, self.amplitude, MOST_TRIED)
-        best = max((self.saw_near(1 / self.stops.wave[k]) for k in places), default=(0.0, 0.0))
+        A saw-tooth of steps s is the sum over k of -(s / pi k) (-1)^(k+1) sin(2 pi k (x / s - phase)).
+        """
+        waves = self.stops.wave
+        pulls = np.zeros((len(waves), len(FEW_PHASES)))
+        for k in range(1, HARMONICS + 1):
+            harmonic = np.conj(self._pull[::k])[:, None] * np.exp(-2j * np.pi * k * FEW_PHASES)
+            pulls[: len(harmonic)] += (-1) ** (k + 1) / k * harmonic.imag
+        # Teeth of s have a mean square of s^2 / 12: their size cancels.
+        energy = 12 / np.pi**2 * np.max(pulls**2, axis=1) / self.stops.strength.sum()
+        return np.where(waves < 1 / self.stops.coarsest, 0.0, energy)
+
+    @cached_property
+    def likely(self) -> Array:
+        """Waves of which steps may be, in a unit of x."""
+        if self.stops.span < 4 * self.stops.coarsest / 3 or not self.power.max() > PEAK:
+            return np.zeros(0)
+        return self.stops.wave[_peaks(self.saw_energy, MOST_TRIED)]
+
+    def steps(self, waves: Array) -> tuple[float, float] | None:
+        """Size and phase of the steps that explain most, of those of some waves; None: none does."""
+        best = max((self.saw_near(1 / wave) for wave in waves), default=(0.0, 0.0))
         if best[0] <= 0:
             return None
         step = sharp_size([self], best[1])
@@ -253,15 +260,16 @@ def sharp_size(spectra: Sequence[Spectrum], step: float) -> float:
     return step
 
 
-def _whole_steps(wave: Array, power: Array, amplitude: Array, most: int) -> np.ndarray:
-    """The wave that stands out most, and such as do nearly so and have the amplitude of whole steps of their length.
-
-    Where a joint stood at few places, steps of many lengths look alike but for that: a saw-tooth of steps s has a
-    fundamental wave of amplitude s / pi.
-    """
-    high = np.flatnonzero(power > ALIKE * power.max())
-    off = np.abs(np.log(np.maximum(np.pi * wave[high] * amplitude[high], 1e-300)))
-    return np.unique([*high[np.argsort(off)[: most - 1]], *high[np.argsort(power[high])[-1:]]]).astype(int)
+def _peaks(values: Array, most: int) -> np.ndarray:
+    """The places of the highest values, no two of them beside each other."""
+    left, out = values.copy(), []
+    for _ in range(most):
+        k = int(np.argmax(left))
+        if not left[k] > 0:
+            break
+        out.append(k)
+        left[max(k - BESIDE, 0) : k + BESIDE + 1] = 0.0
+    return np.array(out, dtype=int)
 
 
 def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | None:
@@ -271,10 +279,8 @@ def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | No
     total = sum(spectrum.power[place] for spectrum, place in zip(spectra, places, strict=True))
     if not total.max() > PEAK + 2 * len(spectra):
         return None
-    strengths = [float(spectrum.stops.strength.sum()) for spectrum in spectra]
-    amplitudes = [spectrum.amplitude[place] for spectrum, place in zip(spectra, places, strict=True)]
-    amplitude = np.average(amplitudes, axis=0, weights=strengths)
-    found = _whole_steps(waves, total, amplitude, MOST_TRIED_ALIKE)
+    energy = sum(spectrum.saw_energy[place] for spectrum, place in zip(spectra, places, strict=True))
+    found = _peaks(energy, MOST_TRIED_ALIKE)
     best = max((_alike_near(spectra, 1 / waves[k]) for k in found), default=(0.0, 0.0))
     return _alike(spectra, sharp_size(spectra, best[1])) if best[0] > 0 else None
 

@@ -62,6 +62,12 @@ class JointErrors:
             width /= 8
         return float(best)
 
+    @property
+    def merged(self) -> "JointErrors":
+        """The same with all points at one place as one: steps are the same for them, and arms stand long at some."""
+        x, which = np.unique(self.x, return_inverse=True)
+        return JointErrors(x, np.bincount(which, self.strength, len(x)), np.bincount(which, self.error, len(x)))
+
     def within(self, step: float) -> "JointErrors":
         """The same, none of them larger than a step: no outlier counts for more."""
         most = step * self.strength
