@@ -198,7 +198,8 @@ def analyse(
         progress((turn + 0.5) / (PASSES + 1), "searching for causes")
         white = whitening(noise.covariance_m2, noise.weight, noise.memory)
         problem = pose_problem(sim, told_doings, library, aim, white)
-        best = _best_prior(problem, float(noise.floor_m2.mean()), GEOMETRY_STAYS if drawn else GEOMETRY_CLOSES)
+        floor_m2 = float(noise.floor_m2.mean())
+        best = _best_prior(problem, floor_m2, GEOMETRY_STAYS if drawn else GEOMETRY_CLOSES, turn == 0)
         drawn = bool(best.given.groups)
         learnt = _learn(told_doings, problem, best, first, told, steps=turn == 0)
         fresh = [one for one in learnt.sharper if one.place.effect not in without]
@@ -296,15 +297,22 @@ def _rescaled(covariance: Array, variance: float) -> Array:
     return covariance + extra * np.eye(3)
 
 
-def _best_prior(problem: Problem, floor_m2: float, closes: float) -> Hypothesis:
+def _best_prior(problem: Problem, floor_m2: float, closes: float, first: bool) -> Hypothesis:
     """The geometry prior under which everything together is most probable, and what is found with it.
 
     Args:
         closes: part of what causes alone leave beyond the floor that geometry with causes may leave, to be drawn.
+        first: whether the sim has not been placed anew about the strongest cause yet.
     """
     calibrated = _as_calibrated(problem)
     if not _geometry_strays(problem):
         return calibrated
+    if first and calibrated.found.chosen.groups:
+        # What a large cause bends, free geometry takes up: that is known once the sim stands where the cause lets it.
+        state = Chosen(calibrated.found.chosen.groups[:1], calibrated.found.chosen.sizes[:1])
+        _, _, bent_m2 = _about_fit(problem, calibrated.evidence, calibrated.geometry_prior, state, calibrated.given)
+        if bent_m2 > BENT**2 * floor_m2:
+            return calibrated
     left = _kept_out_m2(problem, calibrated, KNOWN)
     if left <= FAR_LEFT * floor_m2:
         return calibrated

@@ -35,11 +35,15 @@ LOCALLY = 0.92
 MOSTLY = 0.85
 """Such a share, where all that was found at the place closes the rest down to the noise."""
 WEAKER = 0.10
-"""Of what is closed at one place: the second name there must close so much."""
+"""Of what is closed at one place: the second name there must close so much, or complete the first down to the noise."""
+SECOND = 0.3
+"""Of the noise: the first must leave so much for a second."""
 MOVES = 0.1
 """Of what can be closed: what adds little to the evidence but closes so much is judged all the same."""
 AT_FLOOR = 1.5
 """Times the noise (mean squares) that names leave at most where all of them, the small ones too, are real."""
+NEXT_TO_NOTHING = 1e-3
+"""Of what could be closed: where so little is left of a large gap, no other form would leave it."""
 MOST_NAMELESS = 3
 COMPLETED = frozenset({"thermal", "drift", "axis_wobble", "linkage", "payload", "compliance", "flexure", "hysteresis"})
 """Effects whose forms are rough: several of one place describe it together."""
@@ -351,9 +355,11 @@ class Spot:
 
     @cached_property
     def to_the_noise(self) -> bool:
-        """Whether all that was found leaves no more than noise and what nothing flexible could fit."""
-        everything = joined(self.elsewhere, self.here, self.judge.found)
-        return self.judge.square(everything) < AT_FLOOR * self.judge.excess * self.judge.expected_m2(everything)
+        """Whether all that was found leaves no more than noise and what nothing flexible could fit, or next to none."""
+        judge, everything = self.judge, joined(self.elsewhere, self.here, self.judge.found)
+        left_m2 = judge.square(everything)
+        noise_m2 = AT_FLOOR * judge.excess * judge.expected_m2(everything)
+        return left_m2 < noise_m2 or left_m2 - judge.floor_m2 < NEXT_TO_NOTHING * judge.closable_m2
 
     def candidate(self, k: int) -> Candidate:
         return self.judge.problem.candidates[self.here.groups[k]]
@@ -381,7 +387,8 @@ def _names(spot: Spot) -> list[Stand]:
     both = max(pairs, key=spot.closes_m2, default=[])
     if both and spot.share(both) >= LOCALLY:
         closed, rest = spot.closes_m2(both), both[len(forms) :]
-        if closed - spot.closes_m2(forms) >= WEAKER * closed:
+        more, completes = closed - spot.closes_m2(forms), spot.share(both) >= EXACTLY and spot.to_the_noise
+        if more >= WEAKER * closed or (completes and more > spot.judge.floor_m2):
             return [_stand(spot, which, spot.share(both)) for which in (forms, rest)]
     return []
 
@@ -390,7 +397,7 @@ def _second(spot: Spot, which: list[int]) -> list[int]:
     """A second name at the same place that closes what the first leaves, where that is more than the noise."""
     closed = spot.closes_m2(which)
     left = spot.ceiling_m2 - closed
-    if left < spot.judge.floor_m2:
+    if left < SECOND * spot.judge.floor_m2:
         return []
     sure = spot.share(which) >= EXACTLY
     for k in spot.order:

@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from core.gap.effects import drives
 from core.geometry import Array
 
-SHARES = (0.5, 1.6)
+SHARES = (0.3, 1.6)
 PHASES, PHASES_AROUND = np.arange(32) / 32, 17
 WIDEST, TRIED, ROUNDS, SPREAD = 0.08, 17, 3, 3.0
 """Shares of a step by which edges are moved, at the ends and in the middle; moves tried on either side of none, and
