@@ -38,6 +38,8 @@ STRAY = 2.5
 FAR_LEFT, GEOMETRY_CLOSES, GEOMETRY_STAYS = 2.0, 0.6, 0.9
 """That is said where causes alone leave so many times the floor, and geometry with causes at most such a part of what
 they leave beyond it (mean squares); and stays so in later passes."""
+STRAIGHTENED = 60
+"""Likeliest candidates with which it is seen whether causes suffice that bend the sim."""
 NULL_QUANTILE, NULL_MARGIN = 0.9, 5.0
 """Of the largest evidence that noise alone makes; beyond a quantile it falls off as exp(-x). What a calibration leaves
 of geometry makes more than noise alone."""
@@ -199,7 +201,7 @@ def analyse(
         white = whitening(noise.covariance_m2, noise.weight, noise.memory)
         problem = pose_problem(sim, told_doings, library, aim, white)
         floor_m2 = float(noise.floor_m2.mean())
-        best = _best_prior(problem, floor_m2, GEOMETRY_STAYS if drawn else GEOMETRY_CLOSES, turn == 0)
+        best = _best_prior(problem, floor_m2, GEOMETRY_STAYS if drawn else GEOMETRY_CLOSES)
         drawn = bool(best.given.groups)
         learnt = _learn(told_doings, problem, best, first, told, steps=turn == 0)
         fresh = [one for one in learnt.sharper if one.place.effect not in without]
@@ -297,23 +299,18 @@ def _rescaled(covariance: Array, variance: float) -> Array:
     return covariance + extra * np.eye(3)
 
 
-def _best_prior(problem: Problem, floor_m2: float, closes: float, first: bool) -> Hypothesis:
+def _best_prior(problem: Problem, floor_m2: float, closes: float) -> Hypothesis:
     """The geometry prior under which everything together is most probable, and what is found with it.
 
     Args:
         closes: part of what causes alone leave beyond the floor that geometry with causes may leave, to be drawn.
-        first: whether the sim has not been placed anew about the strongest cause yet.
     """
     calibrated = _as_calibrated(problem)
     if not _geometry_strays(problem):
         return calibrated
-    if first and calibrated.found.chosen.groups:
-        # What a large cause bends, free geometry takes up: that is known once the sim stands where the cause lets it.
-        state = Chosen(calibrated.found.chosen.groups[:1], calibrated.found.chosen.sizes[:1])
-        _, _, bent_m2 = _about_fit(problem, calibrated.evidence, calibrated.geometry_prior, state, calibrated.given)
-        if bent_m2 > BENT**2 * floor_m2:
-            return calibrated
     left = _kept_out_m2(problem, calibrated, KNOWN)
+    if left > FAR_LEFT * floor_m2:
+        left = min(left, _straightened_m2(problem, calibrated, floor_m2))
     if left <= FAR_LEFT * floor_m2:
         return calibrated
     # As drawn: data enough overcome any prior, and what is fitted along must not hide what is off.
@@ -353,6 +350,26 @@ def _kept_out_m2(problem: Problem, one: Hypothesis, prior: float) -> float:
     names, given = one.found, one.given
     kept = KeptOut(problem, blocks(problem.sim.seen), prior, joined(given, names.chosen, names.worth).groups)
     return min(kept.square_m2(joined(given, some)) for some in (names.chosen, names.worth))
+
+
+def _straightened_m2(problem: Problem, one: Hypothesis, floor_m2: float) -> float:
+    """What causes leave of kept-out points once the sim is placed anew about the strongest, m^2; infinite: it stands.
+
+    What a large cause bends, free geometry takes up, and seems to be needed for it.
+    """
+    found = one.found
+    state = Chosen(found.chosen.groups[:1], found.chosen.sizes[:1])
+    if not state.groups:
+        return np.inf
+    sim, aim_m, bent_m2 = _about_fit(problem, one.evidence, one.geometry_prior, state, one.given)
+    if bent_m2 < BENT**2 * floor_m2:
+        return np.inf
+    likely = problem.named[np.argsort(-found.alone[problem.named])[:STRAIGHTENED]]
+    groups = list(dict.fromkeys((*found.chosen.groups, *(int(g) for g in likely))))
+    few = pose_problem(sim, problem.doings, [problem.candidates[g] for g in groups], aim_m, problem.white)
+    again = search(few.evidence(one.geometry_prior), few.named, few.cost, one.threshold)
+    kept = KeptOut(few, blocks(problem.sim.seen), KNOWN, again.chosen.groups)
+    return kept.square_m2(again.chosen)
 
 
 def null_threshold(problem: Problem, evidence: Evidence) -> float:

@@ -22,8 +22,8 @@ PEAK = 20.0
 """A line of the spectrum must stand so many times above its neighbourhood."""
 HARMONICS = 6
 """Of a saw-tooth, which tell steps from what else comes and goes."""
-BESIDE, MOST_TRIED, MOST_TRIED_ALIKE = 6, 6, 3
-"""Waves so near are the same; so many others are tried."""
+BESIDE, MOST_TRIED, MOST_TRIED_ALIKE, MOST_ALIKE = 6, 6, 3, 2
+"""Waves so near are the same; so many others are tried, and sizes that are common to all joints."""
 STEPS_AROUND, ALIKE_AROUND = 41, 61
 TANGLED = 2
 """Times that the steps of several joints are found each in what the others leave."""
@@ -136,7 +136,10 @@ def _in_spectra(spectra: Sequence["Spectrum"], waves: Sequence[Array]) -> list[d
     turning = [spectrum for spectrum in spectra if not spectrum.stops.sliding]
     if len(turning) > 1:
         sizes = {single[one.stops.joint][0] for one in turning if one.stops.joint in single}
-        out += [alike for alike in (common_steps(turning), *(_alike(turning, size) for size in sizes)) if alike]
+        common = common_size(turning)
+        sizes |= set() if common is None else {common}
+        likely = sorted(sizes, key=lambda size: -_energy_alike(turning, size))[:MOST_ALIKE]
+        out += [_alike(turning, size) for size in likely]
     return out
 
 
@@ -272,7 +275,7 @@ def _peaks(values: Array, most: int) -> np.ndarray:
     return np.array(out, dtype=int)
 
 
-def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | None:
+def common_size(spectra: list[Spectrum]) -> float | None:
     """One size of steps for all turning joints, by the sum of their spectra; None: none stands out."""
     waves = max((spectrum.stops for spectrum in spectra), key=lambda stops: stops.span).wave
     places = [np.rint(waves * 2 * spectrum.stops.span).astype(int) for spectrum in spectra]
@@ -282,12 +285,17 @@ def common_steps(spectra: list[Spectrum]) -> dict[int, tuple[float, float]] | No
     energy = sum(spectrum.saw_energy[place] for spectrum, place in zip(spectra, places, strict=True))
     found = _peaks(energy, MOST_TRIED_ALIKE)
     best = max((_alike_near(spectra, 1 / waves[k]) for k in found), default=(0.0, 0.0))
-    return _alike(spectra, sharp_size(spectra, best[1])) if best[0] > 0 else None
+    return sharp_size(spectra, best[1]) if best[0] > 0 else None
 
 
 def _alike(spectra: list[Spectrum], size: float) -> dict[int, tuple[float, float]]:
     """Steps of one size for all, at the best phase of each."""
     return {spectrum.stops.joint: (size, spectrum.errors.sharp_phase(size)) for spectrum in spectra}
+
+
+def _energy_alike(spectra: list[Spectrum], size: float) -> float:
+    """What steps of one size explain, each joint's at its best phase."""
+    return sum(float(one.errors.explained(np.full(len(PHASES), size), PHASES).max()) for one in spectra)
 
 
 def _alike_near(spectra: list[Spectrum], step: float) -> tuple[float, float]:
