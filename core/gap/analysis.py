@@ -11,7 +11,7 @@ from core.gap.design import Design
 from core.gap.doings import Doings, doings
 from core.gap.effects.candidate import Candidate
 from core.gap.encoder_steps import encoder_steps
-from core.gap.evidence import NOTHING, Chosen, Evidence, joined
+from core.gap.evidence import NOTHING, Chosen, Evidence, joined, without
 from core.gap.folds import blocks
 from core.gap.kept_out import KeptOut
 from core.gap.library import candidates
@@ -56,6 +56,8 @@ BEYOND_STATEMENT = 6.0
 """Times the stated variance: a statement may be off by a factor of two."""
 ROW = 3
 """Points of one target off one after the other, which chance hardly ever makes outliers."""
+FEW, NEARLY_ALL = 2, 0.7
+"""Points that make such a share of all that a change explains are outliers, and no change."""
 CHANCE, LEAST_EXCESS = 3.5, 0.2
 """Standard deviations, and logarithm of a ratio of variances, beyond which repeats scatter less than residuals."""
 
@@ -427,6 +429,10 @@ def _learn(
     chosen = [problem.candidates[g] for g in everything.groups]
     better = sharpened(problem.sim, told, chosen, named_left, own, scale)
     noise = _undoubted(noise, first, told.seen, chosen, better)
+    moments = [g for g in found.chosen.groups if problem.candidates[g].place.record is not None]
+    if moments:
+        unchanged, _ = _left(problem, evidence, prior, without(everything, moments))
+        noise = _doubted(noise, _spoken_for_by_few(told.seen, unchanged, named_left, noise))
     if steps or noise.excess > 1:
         aims = [named_left]
         if steps and found.chosen.groups:
@@ -559,6 +565,27 @@ def _undoubted(
                 between |= (seen.record >= low) & (seen.record <= high)
     outliers = noise.outliers[~between[noise.outliers]]
     return replace(noise, weight=np.where(between, first.weight, noise.weight), outliers=outliers)
+
+
+def _spoken_for_by_few(seen: Observations, before_m: Array, after_m: Array, noise: NoiseFound) -> np.ndarray:
+    """Indices of the one or two points for whose sake moments of change were found, (k,).
+
+    Args:
+        before_m: residuals without the changes, (m, 3).
+        after_m: with them, (m, 3).
+    """
+    white = whitening(noise.covariance_m2, np.ones(seen.count))
+    before, after = (np.sum(white.rows(part) ** 2, axis=1) * seen.fitted for part in (before_m, after_m))
+    smaller = before - after
+    most = np.argsort(-smaller)[:FEW]
+    few = most[before[most] > noise_found.OUTLYING**2]
+    return few if smaller[few].sum() > NEARLY_ALL * max(float(smaller.sum()), 1e-300) else few[:0]
+
+
+def _doubted(noise: NoiseFound, points: np.ndarray) -> NoiseFound:
+    weight = noise.weight.copy()
+    weight[points] = 0.0
+    return replace(noise, weight=weight, outliers=np.union1d(noise.outliers, points))
 
 
 def _outlying(seen: Observations, left_m: Array, covariance_m2: Array, used: np.ndarray) -> np.ndarray:

@@ -28,6 +28,8 @@ EXACT, EXACTLY = frozenset({"zero_offset", "ratio", "eccentricity", "mesh"}), 0.
 is smooth looks like them otherwise."""
 FORMED, OUTDONE = frozenset({"zero_offset", "ratio", "eccentricity", "linkage"}), 0.015
 """Effects of one joint of which a function without a name explains no more by such a share of the evidence."""
+WAVES, COMPOSED = 2, 0.02
+"""So many more waves of one joint, which say such a share of what a mesh does, make no mesh of it."""
 FEWEST_TEETH = 3.0
 """Times a turn."""
 LOCALLY = 0.92
@@ -295,7 +297,21 @@ def _right(judge: Judge, stand: Stand, others: Chosen) -> bool:
     """Whether a name does not only stand in for something: by its numbers, and by what has no name; all else given."""
     rest = without(joined(judge.given, others), stand.groups[:1])
     one = own(judge.problem, judge.evidence, stand.groups[0], stand.sizes[0], rest)
-    return plausible(one, judge.problem.sim.seen.chain) and not _outdone(judge, stand, rest)
+    numbers = plausible(one, judge.problem.sim.seen.chain)
+    return numbers and not _outdone(judge, stand, rest) and not _composed(judge, stand)
+
+
+def _composed(judge: Judge, stand: Stand) -> bool:
+    """Whether a mesh is one of many waves of its joint: of such a sum is anything, a bump at one place as well."""
+    if stand.place.effect != "mesh":
+        return False
+    candidates, everything = judge.problem.candidates, judge.everything
+    waves = [g for g in judge.found.groups if candidates[g].place.same_as(stand.place) and g not in stand.groups]
+    if len(waves) < WAVES:
+        return False
+    whole, alone = judge.evidence.given(everything), without(everything, waves)
+    own_evidence = whole - judge.evidence.given(without(alone, stand.groups))
+    return whole - judge.evidence.given(alone) > COMPOSED * own_evidence
 
 
 def _outdone(judge: Judge, stand: Stand, others: Chosen) -> bool:

@@ -14,7 +14,7 @@ from core.gap.library import joint_alone
 from core.gap.sim import Part, Sim, Slot
 from core.geometry import Array
 
-FINER = 25
+FINER, FEWEST = 25, 4
 WARM_UP = (0.02, 3.0)
 """The range of time constants of warming up, as shares of the whole time."""
 OF_THE_BASE = frozenset({"drift", "base_shift", "thermal"})
@@ -115,7 +115,10 @@ def _shift(sim: Sim, doings: Doings, record: int | None, aim_m: Array, weight: A
     squares = np.cumsum(np.einsum("mck,mcl->mkl", fields, fields)[::-1], axis=0)[::-1]
     pulls = np.cumsum(np.einsum("mck,mc->mk", fields, aim)[::-1], axis=0)[::-1]
     # What happened while nobody looked is told from the record on at which it was seen.
-    starts = (np.arange(seen.count) if target is None else np.flatnonzero(seen.target == target))[1:]
+    rows = np.arange(seen.count) if target is None else np.flatnonzero(seen.target == target)
+    # What only a few points on one side speak for is no change, but an outlier among them.
+    edge = max(min(FEWEST, (len(rows) - 1) // 2), 1)
+    starts = rows[edge : len(rows) - edge + 1]
     if record is not None:
         near = np.abs(seen.record[starts] - record) <= np.ptp(seen.record) * 2.0 / instrument.MOMENTS
         starts = starts[near] if near.any() else starts
