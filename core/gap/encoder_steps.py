@@ -12,7 +12,7 @@ from core.gap.effects.candidate import Candidate, motors
 from core.gap.effects.drives import EncoderSteps
 from core.gap.library import joint_alone
 from core.gap.sim import Part, Sim, Slot
-from core.gap.step_edges import PHASES, JointErrors, settled
+from core.gap.step_edges import PHASES, JointErrors, possible, settled, whole
 from core.geometry import Array
 
 COARSEST_STEP_RAD, COARSEST_STEP_M = 0.06, 0.02
@@ -22,6 +22,8 @@ PEAK = 20.0
 """A line of the spectrum must stand so many times above its neighbourhood."""
 HARMONICS = 6
 """Of a saw-tooth, which tell steps from what else comes and goes."""
+ALIKE = 0.8
+"""Waves of at least so much of the greatest power may be the steps'."""
 BESIDE, MOST_TRIED, MOST_TRIED_ALIKE, MOST_ALIKE = 6, 6, 3, 2
 """Waves so near are the same; so many others are tried, and sizes that are common to all joints."""
 STEPS_AROUND, ALIKE_AROUND = 41, 61
@@ -128,14 +130,14 @@ def _steps_of(sim: Sim, doings: Doings, part: Part, aims_m: Sequence[Array], wei
 
 def _in_spectra(spectra: Sequence["Spectrum"], waves: Sequence[Array]) -> list[dict[int, tuple[float, float]]]:
     """Steps of one joint after the other, of those together, and of all alike: size and phase by joint."""
-    tried = zip(spectra, waves, strict=True)
-    single = {one.stops.joint: found for one, likely in tried if (found := one.steps(likely)) is not None}
-    out = [{joint: found} for joint, found in single.items()]
+    each = {one.stops.joint: one.steps(likely) for one, likely in zip(spectra, waves, strict=True)}
+    out = [{joint: one} for joint, found in each.items() for one in found]
+    single = {joint: found[0] for joint, found in each.items() if found}
     if len(single) > 1:
         out.append(single)
     turning = [spectrum for spectrum in spectra if not spectrum.stops.sliding]
     if len(turning) > 1:
-        sizes = {single[one.stops.joint][0] for one in turning if one.stops.joint in single}
+        sizes = {size for one in turning for size, _ in each[one.stops.joint]}
         common = common_size(turning)
         sizes |= set() if common is None else {common}
         likely = sorted(sizes, key=lambda size: -_energy_alike(turning, size))[:MOST_ALIKE]
@@ -186,6 +188,15 @@ class Stops:
         """Sum of the weights times each wave over their sum."""
         return self._weights[: len(self.wave)] / self.strength.sum()
 
+    @cached_property
+    def products(self) -> tuple[Array, Array, Array]:
+        """Weighted squares of cosines and of sines less their means, and their products."""
+        whole, once = float(self.strength.sum()), self.weighed
+        twice = self._weights[: 2 * len(self.wave) : 2]
+        cosines = (whole + twice.real) / 2 - whole * once.real**2
+        sines = (whole - twice.real) / 2 - whole * once.imag**2
+        return cosines, sines, -twice.imag / 2 + whole * once.real * once.imag
+
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -211,41 +222,49 @@ class Spectrum:
         return np.where(self.stops.wave < 1 / self.stops.coarsest, 0.0, power)
 
     @cached_property
+    def amplitude(self) -> Array:
+        """Of each wave when it is fitted to the errors beside a constant, rad or m."""
+        cosines, sines, both = self.stops.products
+        cosine, sine = self._pull.real, -self._pull.imag
+        determinant = np.maximum(cosines * sines - both**2, 1e-6 * float(self.stops.strength.sum()) ** 2)
+        return np.hypot(sines * cosine - both * sine, cosines * sine - both * cosine) / determinant
+
+    @cached_property
     def saw_energy(self) -> Array:
-        """Energy that steps of each wave's length explain at their best phase, in energies of noise.
+        """Energy that steps of each wave's length explain at their best phase, (waves,).
 
         A saw-tooth of steps s is the sum over k of -(s / pi k) (-1)^(k+1) sin(2 pi k (x / s - phase)).
         """
-        waves = self.stops.wave
-        pulls = np.zeros((len(waves), len(FEW_PHASES)))
+        pulls = np.zeros((len(self.stops.wave), len(FEW_PHASES)))
         for k in range(1, HARMONICS + 1):
             harmonic = np.conj(self._pull[::k])[:, None] * np.exp(-2j * np.pi * k * FEW_PHASES)
             pulls[: len(harmonic)] += (-1) ** (k + 1) / k * harmonic.imag
         # Teeth of s have a mean square of s^2 / 12: their size cancels.
         energy = 12 / np.pi**2 * np.max(pulls**2, axis=1) / self.stops.strength.sum()
-        return np.where(waves < 1 / self.stops.coarsest, 0.0, energy)
+        return np.where(self.stops.wave < 1 / self.stops.coarsest, 0.0, energy)
 
     @cached_property
     def likely(self) -> Array:
         """Waves of which steps may be, in a unit of x."""
         if self.stops.span < 4 * self.stops.coarsest / 3 or not self.power.max() > PEAK:
             return np.zeros(0)
-        return self.stops.wave[_peaks(self.saw_energy, MOST_TRIED)]
+        alike = _whole_steps(self.stops.wave, self.power, self.amplitude, MOST_TRIED)
+        return self.stops.wave[np.unique([*_peaks(self.saw_energy, MOST_TRIED), *alike])]
 
-    def steps(self, waves: Array) -> tuple[float, float] | None:
-        """Size and phase of the steps that explain most, of those of some waves; None: none does."""
-        best = max((self.saw_near(1 / wave) for wave in waves), default=(0.0, 0.0))
-        if best[0] <= 0:
-            return None
-        step = sharp_size([self], best[1])
-        return step, self.errors.sharp_phase(step)
+    def steps(self, waves: Array) -> list[tuple[float, float]]:
+        """Sizes and phases of the steps, of some waves, that explain most: any share of them, and whole ones."""
+        near = [found for wave in waves for found in self._saws_near(1 / wave)]
+        sizes = {max(near[k::2])[1]: None for k in (0, 1) if near and max(near[k::2])[0] > 0}
+        sharp = [sharp_size([self], size) for size in sizes]
+        return [(step, self.errors.sharp_phase(step)) for step in sharp]
 
-    def saw_near(self, step: float) -> tuple[float, float]:
-        """The best explained energy near a size of steps, and the size."""
+    def _saws_near(self, step: float) -> list[tuple[float, float]]:
+        """The best energy near a size of steps, and the size: of any share of them, and of whole ones."""
         sizes = step + step**2 / self.stops.span / 2 * np.linspace(-1, 1, STEPS_AROUND)
-        energy = self.best_energy(sizes)
-        best = int(np.argmax(energy))
-        return float(energy[best]), float(sizes[best])
+        told = self.errors.shares(np.repeat(sizes, len(FEW_PHASES)), np.tile(FEW_PHASES, len(sizes)))
+        energy, share = (part.reshape(len(sizes), -1) for part in told)
+        each = [np.where(possible(share), energy, 0.0).max(axis=1), (energy * whole(share)).max(axis=1)]
+        return [(float(one.max()), float(sizes[int(np.argmax(one))])) for one in each]
 
     def best_energy(self, sizes: Array) -> Array:
         """Energy that steps of each size (k,) explain at their best phase, (k,)."""
@@ -261,6 +280,17 @@ def sharp_size(spectra: Sequence[Spectrum], step: float) -> float:
         energy = [sum(one.errors.explained(np.full(len(PHASES), s), PHASES).max() for one in spectra) for s in sizes]
         step, width = float(sizes[int(np.argmax(energy))]), width / NARROWER
     return step
+
+
+def _whole_steps(wave: Array, power: Array, amplitude: Array, most: int) -> np.ndarray:
+    """The wave that stands out most, and such as do nearly so and have the amplitude of whole steps of their length.
+
+    Where a joint stood at few places, steps of many lengths look alike but for that: a saw-tooth of steps s has a
+    fundamental wave of amplitude s / pi.
+    """
+    high = np.flatnonzero(power > ALIKE * power.max())
+    off = np.abs(np.log(np.maximum(np.pi * wave[high] * amplitude[high], 1e-300)))
+    return np.unique([*high[np.argsort(off)[: most - 1]], *high[np.argsort(power[high])[-1:]]]).astype(int)
 
 
 def _peaks(values: Array, most: int) -> np.ndarray:

@@ -41,7 +41,9 @@ def _replaced(problem: Problem, evidence: Evidence, chosen: Chosen, k: int, give
         return chosen
     play = replace(place, effect="backlash")
     places = {int(g): problem.candidates[g].place for g in problem.named if g not in others.groups}
-    among = np.array([g for g, p in places.items() if (not p.same_as(place) if impossible else p.same_as(play))])
+    # Steps of another size at the same joint are another form, too.
+    other = {g for g, p in places.items() if not p.same_as(place) or place.effect == "quantisation"}
+    among = np.array([g for g, p in places.items() if (g in other if impossible else p.same_as(play))])
     if not len(among):
         return chosen
     gains = evidence.gains(among, others)

@@ -1,9 +1,9 @@
 """Whether the numbers of a name are such as its effect has: free forms also fit what their effects never make.
 
-A hysteresis that is lost at once is play; play that runs ahead of its motor is none, nor is what never changes side; a
-frame that is off by a turn about the next axis is a zero offset; an axis whose tilts and shifts nearly cancel does not
-wobble. Where the library has the plainer name, that name is the more probable one anyway. Where it has not, something
-without a name acts.
+A hysteresis that is lost at once is play; steps of encoders are whole; play that runs ahead of its motor is none, nor
+is what never changes side; a frame that is off by a turn about the next axis is a zero offset; an axis whose tilts and
+shifts nearly cancel does not wobble. Where the library has the plainer name, that name is the more probable one
+anyway. Where it has not, something without a name acts.
 """
 
 from dataclasses import dataclass
@@ -29,6 +29,8 @@ SURELY = 3.0
 """Standard deviations."""
 GRADUALLY = 0.7
 """Of all that a joint loses at last: a hysteresis loses less at once."""
+WHOLE = (0.8, 1.25)
+"""Shares of an encoder's steps that are still whole ones: a share of others may look alike at even distances."""
 MERELY = 0.98
 """Of what a frame moves: where a turn about one axis does so much, it is that turn."""
 CANCELLING, DRAWS, SEED = 0.05, 4000, 17
@@ -89,6 +91,8 @@ def plausible(one: Own, chain: Robot) -> bool:
         return not _is(one, np.array([float(name.startswith("offset")) for name in one.candidate.names]))
     if effect == "hysteresis":
         return _grows(one)
+    if effect == "quantisation":
+        return bool(WHOLE[0] < one.numbers[0] * one.scale[0] < WHOLE[1])
     if effect == "geometry":
         return not _turns_merely(one, chain)
     return effect != "axis_wobble" or not _cancels(one)

@@ -14,11 +14,23 @@ from scipy.special import logsumexp
 from core.gap.effects import drives
 from core.geometry import Array
 
-SHARES = (0.3, 1.6)
+SHARES, NEARLY = (0.3, 1.6), 0.1
+"""Of steps that errors may show; and standard deviation, in logarithms, of that of whole ones: where a joint stood at
+even distances, shares of steps of many sizes look alike."""
 PHASES, PHASES_AROUND = np.arange(32) / 32, 17
 WIDEST, TRIED, ROUNDS, SPREAD = 0.08, 17, 3, 3.0
 """Shares of a step by which edges are moved, at the ends and in the middle; moves tried on either side of none, and
 rounds, each about the mean of the last one and as wide as so many of its standard deviations."""
+
+
+def whole(share: Array) -> Array:
+    """What steps count of which the errors show a share: all where it is one, less and less where it is not."""
+    return np.exp(-0.5 * (np.log(np.maximum(share, 1e-9)) / NEARLY) ** 2)
+
+
+def possible(share: Array) -> np.ndarray:
+    """Whether errors may show such a share of steps of which other causes took up a part."""
+    return (share > SHARES[0]) & (share < SHARES[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +51,16 @@ class JointErrors:
         return float(told.min()), float(told.max())
 
     def explained(self, steps: Array, phases: Array) -> Array:
-        """Energy that steps of each size and phase (k,) explain; 0 where a share of them does that is far from one.
+        """Energy that steps of each size and phase (k,) explain; 0 where a share of them does that is far from one."""
+        energy, share = self.shares(steps, phases)
+        return np.where(possible(share), energy, 0.0)
 
-        Such a share of other steps may look alike at the few places where a joint stood, and is none.
-        """
+    def shares(self, steps: Array, phases: Array) -> tuple[Array, Array]:
+        """Energy that steps of each size and phase (k,) explain, and the share of them that does."""
         teeth = drives.saw(self.x, steps[:, None], phases[:, None])
         teeth -= (teeth @ self.strength / self.strength.sum())[:, None]
         pull, square = teeth @ self.error, np.maximum(teeth**2 @ self.strength, 1e-300)
-        whole = (pull / square > SHARES[0]) & (pull / square < SHARES[1])
-        return np.where(whole, pull**2 / square, 0.0)
+        return pull**2 / square, pull / square
 
     def energy(self, step: float, phase: float) -> float:
         """What steps of one size and phase explain."""

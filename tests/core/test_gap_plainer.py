@@ -19,9 +19,10 @@ def looked_for(effect: str) -> tuple[Analysis, Found]:
     analysis = analyse(observe(measured(crane_cell(), effect)))
     joint = int(effect.split(":")[1])
     of_joint = [k for k in analysis.problem.named if analysis.problem.candidates[k].place.joint == joint]
-    (group,) = (k for k in of_joint if analysis.problem.candidates[k].place.effect == "hysteresis")
-    gains = analysis.evidence.gains(np.array([group]))
-    chosen = Chosen((int(group),), (float(gains.size[0]),))
+    groups = np.array([k for k in of_joint if analysis.problem.candidates[k].place.effect == "hysteresis"])
+    gains = analysis.evidence.gains(groups)
+    best = int(np.argmax(gains.evidence))
+    chosen = Chosen((int(groups[best]),), (float(gains.size[best]),))
     return analysis, replace(analysis.found, chosen=chosen, worth=chosen, main=chosen)
 
 
