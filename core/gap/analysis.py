@@ -433,10 +433,12 @@ def _learn(
     if moments:
         unchanged, _ = _left(problem, evidence, prior, without(everything, moments))
         noise = _doubted(noise, _spoken_for_by_few(told.seen, unchanged, named_left, noise))
-    if steps or noise.excess > 1:
+    if steps or (noise.excess > 1 and not given.groups):
         aims = [named_left]
         if steps and found.chosen.groups:
-            aims.append(_left(problem, evidence, prior, given)[0])
+            bare, _ = _left(problem, evidence, prior, given)
+            # Where all geometry is free, what names took up is no better known than what they left.
+            aims = [bare] if given.groups else [named_left, bare]
         better += encoder_steps(problem.sim, told, aims, scale)
     if steps:
         better += swings(problem.sim, _left(problem, evidence, prior, given)[0], scale)
