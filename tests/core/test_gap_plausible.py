@@ -102,6 +102,13 @@ def test_hysteresis_grows_with_the_way_or_the_load(loss: float, not_yet: float, 
     assert plausible(form, crane_cell().robot) == right
 
 
+@pytest.mark.parametrize(("share", "right"), [(1.0, True), (0.9, True), (1.1, True), (0.6, False), (1.5, False)])
+def test_steps_of_encoders_are_whole(share: float, right: bool) -> None:
+    """At even distances a share of steps of another size looks alike."""
+    form = form_of(np.array([share]), "quantisation", ("share_1",))
+    assert plausible(form, crane_cell().robot) == right
+
+
 @pytest.mark.parametrize(("under_itself", "right"), [(0.0, True), (0.7, True), (-0.3, True), (-1.0, False)])
 @pytest.mark.parametrize("effect", ["compliance", "flexure"])
 def test_what_bends_bends_under_its_own_weight_too(effect: str, under_itself: float, right: bool) -> None:
