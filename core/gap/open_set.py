@@ -281,8 +281,11 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Cho
         # Small causes at the same place are real where they complete the others down to the noise; but smooth
         # functions of one joint together imitate any other, where none of them does most of it alone.
         first = spot.order[0]
-        if small.groups and not _smooth(spot.candidate(first)):
-            named = _names(replace(spot, elsewhere=joined(elsewhere, small)))
+        others = small
+        if _smooth(spot.candidate(first)):
+            others = without(small, [g for g in small.groups if _imitates(judge.problem.candidates[g])])
+        if others.groups and (others is small or spot.share([first]) >= LOCALLY):
+            named = _names(replace(spot, elsewhere=joined(elsewhere, others)))
         beside = joined(small, without(here, [here.groups[k] for k in spot.forms(first)]))
         imitate = any(_smooth(judge.problem.candidates[g]) for g in beside.groups)
         if not named and spot.share([first]) >= MOSTLY and not imitate:
@@ -439,6 +442,11 @@ def is_slow(candidate: Candidate) -> bool:
     """Whether a mesh has so few teeth that anything smooth looks like it."""
     order = drives.order_of(candidate)
     return candidate.place.effect == "mesh" and order is not None and order < FEWEST_TEETH
+
+
+def _imitates(candidate: Candidate) -> bool:
+    """Whether it is a function of one joint that, with others, looks like any; frames move all that lies beyond."""
+    return _smooth(candidate) and candidate.place.effect != "geometry"
 
 
 def _smooth(candidate: Candidate) -> bool:
