@@ -57,9 +57,7 @@ class GapPanel:
         self._numbers = gui.add_html("")
         self._add = gui.add_folder("Add this effect to the sim", visible=False)
         self._causes, self._next = gui.add_html(""), gui.add_html("")
-        for label, ending in FILES.items():
-            button = gui.add_button(label, icon=viser.Icon.DOWNLOAD)
-            button.on_click(lambda event, ending=ending: self._send(event, ending))
+        self._files = [self._file_button(label, ending) for label, ending in FILES.items()]
         with gui.add_folder("Another campaign", expand_by_default=False):
             hint = "campaign.toml, robot.toml and measurements.csv in a ZIP file; it is compared with its own sim."
             upload = gui.add_upload_button("Diagnose a campaign (ZIP)", mime_type=".zip,application/zip", hint=hint)
@@ -84,7 +82,9 @@ class GapPanel:
     def refresh(self) -> None:
         """Show the last diagnosis of this session."""
         found = self._gaps.found
-        self._verdict.content = verdict_words(found, self._gaps.outdated)
+        self._verdict.content = "" if self._first else verdict_words(found, self._gaps.outdated)
+        for button in self._files:
+            button.visible = found is not None
         if found is not self._drawn:
             self._drawn = found
             self._numbers.content = "" if found is None else numbers_words(found.report)
@@ -103,9 +103,19 @@ class GapPanel:
         self._view.show(None, 0)
 
     @property
+    def _first(self) -> bool:
+        """Whether the first diagnosis is being made: there is nothing to say yet, and nothing to press."""
+        return self._gaps.running and self._gaps.found is None
+
+    @property
     def _on(self) -> int:
         """Which switches are on: bit k, switch k."""
         return sum(1 << k for k, (_, box) in enumerate(self._switches) if box.value)
+
+    def _file_button(self, label: str, ending: str) -> viser.GuiButtonHandle:
+        button = self._gui.add_button(label, icon=viser.Icon.DOWNLOAD, visible=False)
+        button.on_click(lambda event: self._send(event, ending))
+        return button
 
     def _diagnose(self, event: viser.GuiEvent) -> None:
         calibrated = self._sim.value == CALIBRATED
@@ -146,6 +156,7 @@ class GapPanel:
         self._bar.visible = self._stop.visible = working
         self._bar.value = 0.0
         self._working.content = working_words("starting") if working else ""
+        self.refresh()
 
     def _progress(self, done: float, text: str) -> None:
         if not self._there:

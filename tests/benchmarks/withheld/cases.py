@@ -17,6 +17,8 @@ SEEDS = {"dev": 100_000, "test": 116_000_000}
 GAPS = (1.0, 3.0, 10.0)
 IMPOSSIBLE = {("scara", "zero_offset"), ("scara", "linkage"), ("seven", "scale"), ("irb", "scale")}
 """Arms on which nothing of an effect can be seen by construction, or that cannot have it."""
+ALIKE = {("scara", frozenset({"compliance", "payload"}))}
+"""Pairs that are one and the same on an arm: no mixture can be made of them."""
 THIN_EFFECTS = ("backlash", "compliance", None, "eccentricity", "thermal", "zero_offset")
 PHYSICS_ARMS = {
     "compliance": ("irb", "ur", "seven", "l6", "ur", "scara"),
@@ -78,8 +80,12 @@ def _cluttered(numbers: Iterator[int], rng: np.random.Generator) -> Iterator[Cas
 def _mixtures(numbers: Iterator[int], rng: np.random.Generator) -> Iterator[Case]:
     for k in range(40):
         pair = tuple(str(name) for name in rng.permutation(list(NAMED))[:2])
-        arm = next(key for key in _arms(rng) if not {(key, name) for name in pair} & IMPOSSIBLE)
+        arm = next(key for key in _arms(rng) if _can_have_both(key, pair))
         yield Case("mixture", arm, next(numbers), pair, GAPS[1 + k % 2])
+
+
+def _can_have_both(arm: str, pair: tuple[str, ...]) -> bool:
+    return (arm, frozenset(pair)) not in ALIKE and not {(arm, name) for name in pair} & IMPOSSIBLE
 
 
 def _nothing(numbers: Iterator[int], rng: np.random.Generator) -> Iterator[Case]:
