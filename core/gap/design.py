@@ -57,16 +57,17 @@ class Design:
 
     def spread(self, fields: Array) -> Array:
         """The columns, (p, 3, m), with answers of the points to small motions, (slots, 3, m)."""
-        slot, of, feature = self._terms
-        columns, first = np.unique(of, return_index=True)
         fields = np.ascontiguousarray(fields)
         out = np.empty((self.count, *fields.shape[1:]))
-        out[columns] = fields[slot[first]]
-        out[columns] *= feature[first][:, None]
         steady, share = self._steady
-        out[np.setdiff1d(steady, columns)] = 0.0
-        for t in np.setdiff1d(np.arange(len(of)), first):
-            out[of[t]] += fields[slot[t]] * feature[t]
+        out[steady] = 0.0
+        written = set(steady.tolist())
+        for slot, column, feature in zip(*self._terms, strict=True):
+            if column in written:
+                out[column] += fields[slot] * feature
+            else:
+                np.multiply(fields[slot], feature, out=out[column])
+                written.add(column)
         if len(steady):
             out[steady] += np.tensordot(share, fields, axes=1)
         return out

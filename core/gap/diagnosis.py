@@ -442,10 +442,9 @@ def _evidence_map(found: Findings) -> tuple[Cell, ...]:
     cells: dict[tuple[object, ...], Cell] = {}
     for k in a.problem.named:
         place, score = a.problem.candidates[k].place, float(a.found.alone[k])
-        key = (place.effect, place.joint, place.source, place.frame, place.target)
-        if np.isfinite(score) and (key not in cells or score > cells[key].evidence):
+        if np.isfinite(score) and (place.identity not in cells or score > cells[place.identity].evidence):
             closed = min(max(2 * score / total, 0.0), 1.0) * best
-            cells[key] = Cell(place, score, closed)
+            cells[place.identity] = Cell(place, score, closed)
     return tuple(cells.values())
 
 

@@ -235,10 +235,12 @@ class Spectrum:
 
         A saw-tooth of steps s is the sum over k of -(s / pi k) (-1)^(k+1) sin(2 pi k (x / s - phase)).
         """
-        pulls = np.zeros((len(self.stops.wave), len(FEW_PHASES)))
+        parts = np.column_stack([self._pull.real, self._pull.imag])
+        pulls = np.zeros((len(parts), len(FEW_PHASES)))
         for k in range(1, HARMONICS + 1):
-            harmonic = np.conj(self._pull[::k])[:, None] * np.exp(-2j * np.pi * k * FEW_PHASES)
-            pulls[: len(harmonic)] += (-1) ** (k + 1) / k * harmonic.imag
+            turn = 2 * np.pi * k * FEW_PHASES
+            harmonic = parts[::k] @ np.array([np.sin(turn), np.cos(turn)])
+            pulls[: len(harmonic)] += (-1) ** k / k * harmonic
         # Teeth of s have a mean square of s^2 / 12: their size cancels.
         energy = 12 / np.pi**2 * np.max(pulls**2, axis=1) / self.stops.strength.sum()
         return np.where(self.stops.wave < 1 / self.stops.coarsest, 0.0, energy)

@@ -20,6 +20,8 @@ SIZES = 10.0 ** np.linspace(-2.0, 3.0, 21)
 """Scales of a group, in units of one noise standard deviation rms over the coordinates."""
 LEAST_PRECISION = 1e-12
 """Of a nuisance column beside its own square."""
+NARROW = 3
+"""Groups of so few columns are multiplied all at once."""
 HYPER = 0.5 * np.log10(SIZES) ** 2
 
 
@@ -166,26 +168,33 @@ class Evidence:
             best = np.maximum(best, (evidence - cost[mine, None]).max(axis=0))
         return best
 
-    def conditioned(self, groups: np.ndarray, chosen: Chosen) -> Iterator[tuple[np.ndarray, Array, Array]]:
+    def conditioned(self, groups: np.ndarray, chosen: Chosen = NOTHING) -> Iterator[tuple[np.ndarray, Array, Array]]:
         """Squares and pulls of groups of one width at a time, what is chosen taken out."""
+        pull = self.pull
         if chosen.groups:
             index = self.index(chosen.groups)
-            rows = self.square.rows(index)
-            inverse = np.linalg.inv(rows[:, index] + np.diag(self.prior(chosen)))
-            taken = inverse @ self.pull[index]
+            across = self.square.rows(index)
+            solved = np.linalg.inv(across[:, index] + np.diag(self.prior(chosen))) @ across
+            pull = pull - pull[index] @ solved
+        place = np.full(len(self.slices), -1)
+        place[groups] = np.arange(len(groups))
         for one in self.square.stacks:
-            places = np.flatnonzero(np.isin(groups, one.groups))
-            if not len(places):
+            places = place[one.groups]
+            mine = places >= 0
+            if not mine.any():
                 continue
-            mine = np.searchsorted(one.groups, groups[places])
             columns, squares = one.columns[mine], one.squares[mine]
-            pulls = self.pull[columns]
             if chosen.groups:
-                flat = rows[:, columns.ravel()]
-                across, solved = (part.reshape(len(index), *columns.shape) for part in (flat, inverse @ flat))
-                squares = squares - np.moveaxis(across, 0, 2) @ np.moveaxis(solved, 0, 1)
-                pulls = pulls - np.moveaxis(across, 0, 2) @ taken
-            yield places, squares, pulls
+                squares = squares - _between(across, solved, columns)
+            yield places[mine], squares, pull[columns]
+
+
+def _between(across: Array, solved: Array, columns: np.ndarray) -> Array:
+    """Products over the first axis of (k, p) each, for columns (g, w) of each group with each other, (g, w, w)."""
+    if columns.shape[1] > NARROW:
+        return np.moveaxis(across[:, columns], 0, 2) @ np.moveaxis(solved[:, columns], 0, 1)
+    left, right = across.T[columns], solved.T[columns]
+    return np.einsum("gak,gbk->gab", left, right)
 
 
 def _spectra(squares: Array, pulls: Array) -> tuple[Array, Array]:
@@ -197,12 +206,8 @@ def _spectra(squares: Array, pulls: Array) -> tuple[Array, Array]:
 def best_sizes(spectrum: Array, pulls: Array) -> tuple[Array, Array]:
     """Log evidence at the best scale, and the scale, (g, d) each."""
     power = pulls**2
-    shape = (len(SIZES), *power.shape[::2])
-    table = np.empty(shape)
-    for k, size in enumerate(SIZES):
-        grown = 1 + size**2 * spectrum
-        table[k] = (
-            0.5 * np.einsum("gk,gkd->gd", size**2 / grown, power) - 0.5 * np.log(grown).sum(axis=1)[:, None] - HYPER[k]
-        )
+    grown = 1 + SIZES[:, None, None] ** 2 * spectrum
+    occam = 0.5 * np.log(grown).sum(axis=2) + HYPER[:, None]
+    table = 0.5 * np.einsum("sgk,gkd->sgd", SIZES[:, None, None] ** 2 / grown, power) - occam[:, :, None]
     best = table.argmax(axis=0)
     return np.take_along_axis(table, best[None], axis=0)[0], SIZES[best]

@@ -118,11 +118,10 @@ class KeptOut:
             noise_m2: mean square length of the noise of each point, (m,).
         """
         index, prior = self.index(chosen)
-        squares, _ = self._sums
+        folds, squares, _ = self._others
         plain, _, _ = self._plain_sums
-        whole, total = squares[:CHECK].sum(axis=0), float(noise_m2[self.judged].sum())
-        for f in np.unique(self.fold):
-            square = whole - squares[f] if f != CHECK else whole
+        total = float(noise_m2[self.judged].sum())
+        for f, square in zip(folds, squares, strict=True):
             covariance = np.linalg.inv(square[np.ix_(index, index)] + np.diag(prior))
             total += float(np.sum(covariance * plain[f][np.ix_(index, index)]))
         return total / max(np.count_nonzero(self.judged), 1)
@@ -130,12 +129,18 @@ class KeptOut:
     def _by_fold(self, chosen: Chosen) -> Iterator[tuple[int, Array]]:
         """Each fold with the estimates from all others."""
         index, prior = self.index(chosen)
+        folds, squares, pulls = self._others
+        inner = squares[:, index[:, None], index] + np.diag(prior)
+        yield from zip(folds, np.linalg.solve(inner, pulls[:, index, None])[:, :, 0], strict=True)
+
+    @cached_property
+    def _others(self) -> tuple[list[int], Array, Array]:
+        """The folds that there are, and whitened squares and pulls of all points outside of each."""
         squares, pulls = self._sums
-        whole, pull = squares[:CHECK].sum(axis=0), pulls[:CHECK].sum(axis=0)
-        for f in np.unique(self.fold):
-            square = whole - squares[f] if f != CHECK else whole
-            right = pull - pulls[f] if f != CHECK else pull
-            yield int(f), np.linalg.solve(square[np.ix_(index, index)] + np.diag(prior), right[index])
+        folds = np.unique(self.fold)
+        taken = (folds != CHECK)[:, None]
+        square = squares[:CHECK].sum(axis=0) - np.where(taken[:, :, None], squares[folds], 0.0)
+        return folds.tolist(), square, pulls[:CHECK].sum(axis=0) - np.where(taken, pulls[folds], 0.0)
 
     def fitted(self, chosen: Chosen) -> tuple[np.ndarray, Array, Array]:
         """Columns, estimates and their covariance from all folds together."""

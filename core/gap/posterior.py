@@ -54,13 +54,12 @@ def rivals(judge: Judge, stand: Stand, others: Chosen) -> list[tuple[Place, floa
     gains = judge.evidence.gains(named, known)
     score = gains.evidence - judge.problem.cost[named]
     score[np.isin(named, known.groups)] = -np.inf
-    places: list[Place] = []
-    best: list[int] = []
+    first: dict[tuple[str | int | None, ...], int] = {}
     for k in np.argsort(score)[::-1]:
-        place = judge.problem.candidates[named[k]].place
-        if np.isfinite(score[k]) and not any(place.same_as(known) for known in places):
-            places.append(place)
-            best.append(int(k))
+        if np.isfinite(score[k]):
+            first.setdefault(judge.problem.candidates[named[k]].place.identity, int(k))
+    best = list(first.values())
+    places = [judge.problem.candidates[named[k]].place for k in best]
     mine = _index(places, stand.place)
     # No cause at all is one more possibility, without evidence and without cost.
     evidence = np.append(score[best], 0.0)

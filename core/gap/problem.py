@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -65,7 +66,7 @@ class Problem:
         """The nuisance columns over other points of the same arm."""
         return _nuisance([column[0][0] for column in self.design.columns[: self.nuisance - self.doubt]], seen)
 
-    @property
+    @cached_property
     def cost(self) -> Array:
         """What having been chosen from several atoms costs each candidate in log evidence."""
         return np.log([candidate.choices for candidate in self.candidates])
@@ -74,11 +75,11 @@ class Problem:
         """Number of columns of a candidate."""
         return self.slices[candidate].stop - self.slices[candidate].start
 
-    @property
+    @cached_property
     def named(self) -> np.ndarray:
         return np.array([k for k, c in enumerate(self.candidates) if c.named], dtype=int)
 
-    @property
+    @cached_property
     def nameless(self) -> np.ndarray:
         return np.array([k for k, c in enumerate(self.candidates) if not c.named], dtype=int)
 

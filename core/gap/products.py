@@ -62,8 +62,29 @@ class Products(ABC):
         return self.rows(np.arange(self.count))
 
 
+class Remembering(Products):
+    """Products of which each row is worked out once."""
+
+    @abstractmethod
+    def fresh_rows(self, index: np.ndarray) -> Array:
+        """Products of some columns with all, (k, p), worked out."""
+
+    def rows(self, index: np.ndarray) -> Array:
+        known, rows = self._known
+        missing = np.unique(index[~known[index]])
+        if len(missing):
+            rows[missing] = self.fresh_rows(missing)
+            known[missing] = True
+        return rows[index]
+
+    @cached_property
+    def _known(self) -> tuple[np.ndarray, Array]:
+        """Which rows were asked for, (p,), and those, (p, p): memory is taken as they are filled in."""
+        return np.zeros(self.count, dtype=bool), np.empty((self.count, self.count))
+
+
 @dataclass(frozen=True, eq=False)
-class OfColumns(Products):
+class OfColumns(Remembering):
     """Products of columns that are at hand."""
 
     columns: Array
@@ -74,13 +95,8 @@ class OfColumns(Products):
     def count(self) -> int:
         return len(self.columns)
 
-    def rows(self, index: np.ndarray) -> Array:
-        known, rows = self._known
-        missing = np.unique(index[~known[index]])
-        if len(missing):
-            rows[missing] = self.columns[missing] @ self.columns.T
-            known[missing] = True
-        return rows[index]
+    def fresh_rows(self, index: np.ndarray) -> Array:
+        return self.columns[index] @ self.columns.T
 
     def times(self, numbers: Array) -> Array:
         return self.columns @ (self.columns.T @ numbers)
@@ -89,11 +105,6 @@ class OfColumns(Products):
     def stacks(self) -> tuple[Stack, ...]:
         squares = [self.columns[own] @ self.columns[own].T for own in self.slices]
         return tuple(Stack(g, c, np.array([squares[k] for k in g])) for g, c in widths(self.slices))
-
-    @cached_property
-    def _known(self) -> tuple[np.ndarray, Array]:
-        """Which rows were asked for, (p,), and those, (p, p): memory is taken as they are filled in."""
-        return np.zeros(self.count, dtype=bool), np.empty((self.count, self.count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +131,7 @@ class OfSquare(Products):
 
 
 @dataclass(frozen=True, eq=False)
-class Reduced(Products):
+class Reduced(Remembering):
     """Products without what the first columns explain."""
 
     products: Products
@@ -137,7 +148,7 @@ class Reduced(Products):
     def count(self) -> int:
         return self.products.count
 
-    def rows(self, index: np.ndarray) -> Array:
+    def fresh_rows(self, index: np.ndarray) -> Array:
         return self.products.rows(index) - self.first[:, index].T @ self.solved
 
     def times(self, numbers: Array) -> Array:

@@ -48,10 +48,14 @@ class Place:
     variable: str | None = None
     """Of an unknown that follows no joint: ``time`` or ``configuration``."""
 
+    @property
+    def identity(self) -> tuple[str | int | None, ...]:
+        """What makes it one cause; the record at which something moved is a parameter, not a name."""
+        return self.effect, self.joint, self.source, self.frame, self.target, self.variable
+
     def same_as(self, other: "Place") -> bool:
-        """Whether both are one cause; the record at which something moved is a parameter, not a name."""
-        mine = (self.effect, self.joint, self.source, self.frame, self.target, self.variable)
-        return mine == (other.effect, other.joint, other.source, other.frame, other.target, other.variable)
+        """Whether both are one cause."""
+        return self.identity == other.identity
 
 
 @dataclass(frozen=True)

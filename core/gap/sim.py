@@ -13,6 +13,7 @@ approximation they are the exact model; their first derivatives are the columns 
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 
@@ -85,6 +86,7 @@ class Sim:
         out[np.arange(n - 1), np.arange(1, n)] = gains[1:]
         return out
 
+    @cached_property
     def frames(self) -> tuple[Array, Array]:
         """Frames 1..n after and before each joint moved, in the instrument's frame, (m, n, 4, 4) twice."""
         seen = self.seen
@@ -98,12 +100,12 @@ class Sim:
         """Where the sim has the points, (m, 3)."""
         if self.seen.simulated_m is not None:
             return self._placed_points()
-        after, _ = self.frames()
+        after, _ = self.frames
         return self._carried(after)
 
     def fields(self, slots: list[Slot]) -> Array:
         """Derivative of the points with respect to each small motion, (m, 3, slots)."""
-        after, before = self.frames()
+        after, before = self.frames
         points = self._placed_points() if self.seen.simulated_m is not None else self._carried(after)
         out = np.zeros((len(points), 3, len(slots)))
         passed_on = self.passed_on

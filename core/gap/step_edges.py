@@ -50,6 +50,11 @@ class JointErrors:
         told = self.x[self.strength > 0]
         return float(told.min()), float(told.max())
 
+    @cached_property
+    def _mean(self) -> Array:
+        """Shares of the points in a weighted mean."""
+        return self.strength / self.strength.sum()
+
     def explained(self, steps: Array, phases: Array) -> Array:
         """Energy that steps of each size and phase (k,) explain; 0 where a share of them does that is far from one."""
         energy, share = self.shares(steps, phases)
@@ -57,10 +62,12 @@ class JointErrors:
 
     def shares(self, steps: Array, phases: Array) -> tuple[Array, Array]:
         """Energy that steps of each size and phase (k,) explain, and the share of them that does."""
-        teeth = drives.saw(self.x, steps[:, None], phases[:, None])
-        teeth -= (teeth @ self.strength / self.strength.sum())[:, None]
-        pull, square = teeth @ self.error, np.maximum(teeth**2 @ self.strength, 1e-300)
-        return pull**2 / square, pull / square
+        teeth = drives.teeth(self.x / steps[:, None] - phases[:, None])
+        mean = teeth @ self._mean
+        pull = teeth @ self.error - mean * self.error.sum()
+        teeth *= teeth
+        square = np.maximum(teeth @ self.strength - mean**2 * self.strength.sum(), 1e-300)
+        return pull**2 / square, pull / square / steps
 
     def energy(self, step: float, phase: float) -> float:
         """What steps of one size and phase explain."""

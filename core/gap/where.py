@@ -49,7 +49,7 @@ def _sweep_directions(sim: Sim, left_m: Array) -> Array | None:
     if not len(rows):
         return None
     part = sim.part(rows)
-    after, _ = part.frames()
+    after, _ = part.frames
     frame = after[np.arange(len(rows)), part.seen.joint - 1]
     axis = frame[:, :3, 2]
     arm = part.seen.point_m - frame[:, :3, 3]

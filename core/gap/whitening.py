@@ -34,7 +34,11 @@ class Whitening:
     def apart(self, values: Array) -> Array:
         """Values of the points, (m, 3, ...), each whitened by itself."""
         flat = values.reshape(len(values), 3, -1)
-        return ((self.root @ flat) * np.sqrt(self.weight)[:, None, None]).reshape(values.shape)
+        return (self._weighed_root @ flat).reshape(values.shape)
+
+    @cached_property
+    def _weighed_root(self) -> Array:
+        return self.root * np.sqrt(self.weight)[:, None, None]
 
     def unlink(self, columns: Array) -> None:
         """Columns of values, (p, 3, m), each whitened by itself: less the point before, in place."""

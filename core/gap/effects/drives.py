@@ -172,7 +172,12 @@ def _coupling(source: int, joint: int, source_unit: str, own_unit: str) -> Candi
 
 def saw(x: Array, step: float | Array, phase: float | Array) -> Array:
     """What rounding to whole steps does to x."""
-    return step * np.round(x / step - phase) + step * phase - x
+    return step * teeth(x / step - phase)
+
+
+def teeth(steps: Array) -> Array:
+    """What rounding does to a number of steps."""
+    return np.rint(steps) - steps
 
 
 @dataclass(frozen=True, eq=False)
