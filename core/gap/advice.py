@@ -18,6 +18,7 @@ from core.gap.design import Design, candidate_columns
 from core.gap.doings import doings
 from core.gap.evidence import Chosen
 from core.gap.experiments import Block, blocks_for, observe_block
+from core.gap.held_joints import is_offset_of_held, words_to_measure
 from core.gap.problem import Problem
 from core.gap.result import Place, Rivals
 from core.geometry import Array
@@ -34,6 +35,8 @@ CANNOT = (
 def advice(analysis: Analysis, places: tuple[Place, ...]) -> Rivals:
     """The measurement that would separate the first two of some places best, and by how much."""
     problem = analysis.problem
+    if is_offset_of_held(problem.sim.seen, places[0]):
+        return Rivals(places, words_to_measure(places[0]), 0.0)
     groups = [_best_group(analysis, place) for place in places[:2]]
     columns, sums, precision, estimate = _known(analysis, groups)
     now = _noncentrality(sums, precision, problem, estimate)

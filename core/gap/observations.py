@@ -14,6 +14,8 @@ from core.robot import Robot
 
 FALLBACK_SIGMA_M = 1e-4
 """Of a point that states no noise, before the data have been asked."""
+STILL = 1e-6
+"""A joint that goes no farther stands still, rad or m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +140,16 @@ class Observations:
     def span(self) -> Array:
         """How far each joint's motor goes over the points, rad or m, (n,)."""
         return np.ptp(self.active, axis=0)
+
+    @cached_property
+    def held(self) -> np.ndarray:
+        """Joints that stood still at all points, whatever their motors did to hold them against others, (n,)."""
+        return np.ptp(self.net, axis=0) < STILL
+
+    @cached_property
+    def still(self) -> np.ndarray:
+        """Joints whose motors stood still at all points, (n,)."""
+        return self.span < STILL
 
     @cached_property
     def uncoupled(self) -> "Observations":

@@ -11,6 +11,7 @@ from scipy.special import expit
 
 from core.gap.effects.candidate import motors
 from core.gap.evidence import Chosen, joined, without
+from core.gap.held_joints import is_offset_of_held, same_where_held
 from core.gap.lacking import lacks
 from core.gap.open_set import AT_FLOOR, Judge, Stand, chosen_of, is_slow
 from core.gap.plausible import AGAINST, gives_at_one_joint, mostly_idle, own, plausible
@@ -151,7 +152,8 @@ def has_name(judge: Judge, stand: Stand, others: Chosen) -> float:
     unlogged = stand.place.effect in LIKE_LOST_MOTION and not told.past.complete
     if mostly_idle(one):
         most = IDLE_AT_BEST
-    if len(motors(told)) < 2 or unlogged or slow or gives_at_one_joint(one) or lacks(judge, stand, others):
+    doubtful = len(motors(told)) < 2 or unlogged or slow or gives_at_one_joint(one) or lacks(judge, stand, others)
+    if doubtful or is_offset_of_held(told.seen, stand.place):
         most = AT_BEST
     return most * float(expit((stand.local - NAMED_AT) / NAMED_WIDTH))
 
@@ -166,4 +168,6 @@ def twins(
         for place, p in ranked
         if place is not NO_CAUSE and not place.same_as(stand.place) and p >= TWIN_ODDS * max(mine, 1e-12)
     ]
+    same = same_where_held(judge.problem.sim.seen, stand.place)
+    alike = [*same, *(place for place in alike if not any(place.same_as(one) for one in same))]
     return mine * has_name(judge, stand, others), (stand.place, *alike[:11])

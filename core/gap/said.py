@@ -21,8 +21,8 @@ less than so many floors (mean squares), or they only imitate something else."""
 ONE_JOINT, LEAVES = 0.8, 2.0
 """Of the evidence for functions of time or configuration: where one joint's have as much and leave less than so
 many times what those leave beyond the floor, it is that joint."""
-FAINT = 1.3
-"""Times the noise (mean squares) of what does not stand out of it by itself."""
+FAINT, FAINTEST = 1.3, 0.02
+"""Times the noise (mean squares) of what does not stand out of it by itself; and what a name must close of that."""
 
 
 def told_stands(analysis: Analysis) -> list[Stand]:
@@ -114,8 +114,8 @@ class Said:
 
     def _faint(self, named: list[Stand]) -> bool:
         """Whether names close little of what hardly stands out of the noise."""
-        closed = self.judge.base_m2 - self.judge.square(chosen_of(named))
-        return self.judge.base_m2 < FAINT * self.judge.floor_m2 and closed < 0.5 * self.judge.closable_m2
+        floor_m2, closed = self.judge.floor_m2, self.judge.base_m2 - self.judge.square(chosen_of(named))
+        return self.judge.base_m2 < FAINT * floor_m2 and closed < max(0.5 * self.judge.closable_m2, FAINTEST * floor_m2)
 
     def _enough(self, named: list[Stand]) -> bool:
         """Whether names close what can be closed; many together may do so for anything, but not down to the noise."""

@@ -41,9 +41,15 @@ def warnings_of(doings: Doings, noise: NoiseFound, sim: Sim) -> tuple[str, ...]:
         out.append("The payload never changed: elastic effects and once-a-turn errors are hard to tell apart.")
     if table.speed is None and table.readback is None:
         out.append("Neither speeds nor read-back values were logged: latency cannot be tested.")
-    still = [str(j + 1) for j in np.flatnonzero((seen.span < 1e-6) & seen.chain.commanded)]
+    still = [str(j + 1) for j in np.flatnonzero(seen.still & seen.chain.commanded)]
     if still:
         out.append(f"Joints that never moved: {', '.join(still)}: nothing can be said of their drives.")
+    held = [str(j + 1) for j in np.flatnonzero(seen.held & ~seen.still & seen.chain.commanded)]
+    if held:
+        out.append(
+            f"Joints that were held while their motors followed others: {', '.join(held)}: whatever depends on their "
+            "angles looks like a zero offset."
+        )
     hidden = ", ".join(str(j + 1) for j in motors(doings) if _on_axis(sim, j))
     if hidden:
         out.append(f"All targets lie on the axis of joint {hidden}: what its drive does cannot be seen.")

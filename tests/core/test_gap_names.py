@@ -1,5 +1,7 @@
 """Names among small real causes, second names at one place, and what a probability owes to roughness of forms."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from gap_cells import crane_cell, measured
@@ -8,6 +10,7 @@ from numpy.testing import assert_allclose
 from core.gap.diagnosis import diagnose
 from core.gap.posterior import FORM_ERROR, LEAST, MOST, _odds
 from core.gap.result import UNKNOWN, Place
+from core.gap.said import Said
 
 CLUTTERED = (
     ("compliance:3:20urad/Nm", Place("compliance", joint=3), ("axis_wobble:3:0.005deg", "eccentricity:3:0.004deg")),
@@ -35,6 +38,27 @@ def test_two_names_at_one_joint_are_both_told_though_one_is_small(small: str) ->
     ]
     assert found.causes[1].share_closed_last < 0.1
     assert found.left_rms_m < 1.2 * found.noise.floor_rms_m
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "faint"),
+    [
+        (0.99, 0.98, True),
+        (1.02, 1.005, True),
+        (1.2, 1.12, True),
+        (1.0, 0.95, False),
+        (1.2, 1.02, False),
+        (2.0, 1.9, False),
+    ],
+)
+def test_names_that_close_next_to_nothing_of_the_noise_itself_are_not_told(
+    before: float, after: float, faint: bool
+) -> None:
+    """Mean squares of kept-out points in floors, without and with a name; what is left above 1 can be closed."""
+    judge = SimpleNamespace(
+        floor_m2=1e-9, base_m2=before * 1e-9, closable_m2=max(before - 1, 1e-3) * 1e-9, square=lambda some: after * 1e-9
+    )
+    assert Said(None, judge)._faint([]) == faint
 
 
 class TestOdds:

@@ -12,6 +12,7 @@ from core.errors import CampaignError
 from core.gap.corrected import Diagnosis
 from core.gap.diagnosis import diagnose
 from core.gap.gap_json import gap_to_json
+from core.gap.observations import observe
 from core.gap.result import UNKNOWN, Verdict
 from core.measurements import Campaign, Instrument, Measurements, Target
 
@@ -175,3 +176,22 @@ def test_what_kept_out_points_show_is_a_gap_also_where_fitted_ones_show_nothing(
     report = diagnose(changed(some, check=some.measurements.pose >= 0))
     assert report.gap_rms_m > 1e-4
     assert report.verdict is not Verdict.NO_GAP
+
+
+def test_a_zero_offset_of_a_joint_that_was_held_may_be_anything_of_its_angle() -> None:
+    """Motor 2 turns along with motor 1, so that joint 2 stays where it is."""
+    sim = day(ARMS["coupled"](1), 3)
+    commanded = sim.seen.campaign.measurements.commanded.copy()
+    commanded[:, 1] = 0.4
+    seen = observe(changed(sim.seen.campaign, commanded=commanded))
+    assert seen.held.tolist() == [False, True, False, False]
+    assert not seen.still.any()
+    held = replace(sim, seen=seen)
+    exact = chain_points(held, net_of_motors(held, seen.active + np.deg2rad([0.0, 0.2, 0.0, 0.0])))
+    noise = 2e-5 * np.random.default_rng(1).normal(size=exact.shape)
+    report = diagnose(measured_at(held, exact + noise).seen.campaign)
+    assert said(report, "held while their motors followed others: 2:")
+    assert named(report)[:3] == [("zero_offset", 2), ("eccentricity", 2), ("ratio", 2)]
+    assert report.causes[0].probability <= 0.5
+    assert report.rivals[0].next_measurement.startswith("Sweep joint 2 itself")
+    makes_a_file(report)

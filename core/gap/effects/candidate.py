@@ -57,7 +57,7 @@ def unit(doings: Doings, joint: int) -> str:
 
 def motors(doings: Doings) -> list[int]:
     """Joints with a motor that moves at all, from 0."""
-    return [j for j in driven(doings) if doings.seen.span[j] > 1e-6]
+    return [j for j in driven(doings) if not doings.seen.still[j]]
 
 
 def driven(doings: Doings) -> list[int]:
