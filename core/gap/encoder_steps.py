@@ -16,8 +16,10 @@ from core.gap.step_edges import PHASES, JointErrors, possible, settled, whole
 from core.geometry import Array
 
 COARSEST_STEP_RAD, COARSEST_STEP_M = 0.06, 0.02
-SPECTRUM_BINS = 1 << 18
-"""Over the span of a joint."""
+SPECTRUM_BINS = 1 << 17
+"""Over the span of a joint; at least four a wave."""
+SHARED = np.sinc(np.arange(SPECTRUM_BINS + 1) / (2 * SPECTRUM_BINS)) ** 2
+"""What is left of a wave where each point is shared out to the bins before and behind it."""
 PEAK = 20.0
 """A line of the spectrum must stand so many times above its neighbourhood."""
 HARMONICS = 6
@@ -167,17 +169,23 @@ class Stops:
         return COARSEST_STEP_M if self.sliding else COARSEST_STEP_RAD
 
     @cached_property
-    def _bins(self) -> np.ndarray:
-        return np.minimum(((self.x - self.x.min()) / self.span * SPECTRUM_BINS).astype(int), SPECTRUM_BINS - 1)
+    def _bins(self) -> tuple[np.ndarray, Array]:
+        """The bin before each point, and how far it is from there to the next, 0..1."""
+        place = (self.x - self.x.min()) / self.span * SPECTRUM_BINS
+        before = np.minimum(place.astype(int), SPECTRUM_BINS - 1)
+        return before, place - before
 
     def waves(self, values: Array) -> Array:
-        """Sum of values times exp(-2 pi i wave x) for each wave, (SPECTRUM_BINS + 1,)."""
-        return np.fft.rfft(np.bincount(self._bins, values, 2 * SPECTRUM_BINS))
+        """Sum of values times exp(-2 pi i wave (x - least x)) for each wave, (SPECTRUM_BINS + 1,)."""
+        before, beyond = self._bins
+        bins = np.bincount(before, values * (1 - beyond), 2 * SPECTRUM_BINS)
+        bins += np.bincount(before + 1, values * beyond, 2 * SPECTRUM_BINS)
+        return np.fft.rfft(bins) / SHARED
 
     @cached_property
     def wave(self) -> Array:
-        """Waves that are looked at, in a unit of x, (SPECTRUM_BINS // 4 + 1,): finer steps would be blurred."""
-        return np.arange(SPECTRUM_BINS // 4 + 1) / (2 * self.span)
+        """Waves that are looked at, in a unit of x, (SPECTRUM_BINS // 2 + 1,): finer steps would be blurred."""
+        return np.arange(SPECTRUM_BINS // 2 + 1) / (2 * self.span)
 
     @cached_property
     def _weights(self) -> Array:
