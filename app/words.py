@@ -25,6 +25,7 @@ overflow-wrap:normal}[data-testid=table1] th{white-space:nowrap}
 .ta .ta-copy{font:inherit;font-size:11px;line-height:1;padding:2px 7px;margin-left:4px;border-radius:3px;cursor:pointer;
 color:inherit;background:none;border:1px solid var(--mantine-color-default-border)}
 .ta .value{white-space:nowrap}.ta td.name{min-width:7.2em}
+.ta table[data-testid=table1] :is(td,th){padding-inline:2px}
 div:has(> .ta-big)+div button{height:42px!important;font-size:17px;font-weight:700}
 div:has(> .ta-big)+div button .mantine-Button-label{padding-inline-start:6px}
 .ta[data-testid=seat]{margin-bottom:9px}
