@@ -1,7 +1,8 @@
 """What a name leaves unsaid at its own place: next of kin fit nearly as well, and leave notable evidence there.
 
-A hysteresis looks like backlash, a link that bends like a drive that gives, and the reverse. Their forms are nearly
-exact, so that where something else still says much at the same joint, the name is likely that of a relative.
+A hysteresis looks like backlash, a link that bends like a drive that gives, and the reverse; a base that wanders
+looks like one that drifts. Their forms are nearly exact, so that where something else still says much at the same
+joint, or of the same time, the name is likely that of a relative.
 """
 
 import numpy as np
@@ -12,7 +13,14 @@ from core.gap.result import Place
 
 LEAST = 8.0
 """Log evidence that chance leaves at most."""
-SHARES = {"backlash": 0.005, "compliance": 0.0016, "flexure": 0.0016, "payload": 0.01}
+SHARES = {
+    "backlash": 0.005,
+    "base_shift": 0.06,
+    "compliance": 0.0016,
+    "drift": 0.016,
+    "flexure": 0.0016,
+    "payload": 0.01,
+}
 """Of the evidence for a name: more is left by its relatives alone. From simulated worlds with known causes."""
 
 

@@ -20,7 +20,15 @@ def judged(fault: str, *without: str) -> tuple[Findings, Stand]:
 
 
 @pytest.mark.parametrize(
-    "fault", ["backlash:1:0.05deg", "backlash:2:0.05deg", "compliance:3:20urad/Nm", "flexure:2:10urad/Nm"]
+    "fault",
+    [
+        "backlash:1:0.05deg",
+        "backlash:2:0.05deg",
+        "compliance:3:20urad/Nm",
+        "flexure:2:10urad/Nm",
+        "drift:-:0.2mm/h",
+        "base_shift:113:0.5mm",
+    ],
 )
 def test_the_right_name_leaves_nothing_at_its_place(fault: str) -> None:
     found, stand = judged(fault)

@@ -66,6 +66,15 @@ def hurry(sim: Sim) -> Array:
     return 3e-4 * np.sin(2 * np.pi * 16.3 * sim.seen.time[:, None] + phase)
 
 
+def roam(sim: Sim) -> Array:
+    """The whole arm wanders without aim: by chance nearly as far as a drift and a shift would bring it."""
+    steps = np.random.default_rng(2).normal(size=(sim.seen.count, 3))
+    way = np.cumsum(steps, axis=0)
+    moments = np.linspace(sim.seen.time.min(), sim.seen.time.max(), sim.seen.count)
+    there = np.column_stack([np.interp(sim.seen.time, moments, along) for along in way.T])
+    return 3e-4 * there / np.sqrt(np.mean(np.sum(there**2, axis=1)))
+
+
 def shake(sim: Sim) -> Array:
     """Joint 2 comes to rest a little elsewhere each time."""
     angles = 3e-4 * np.random.default_rng(2).normal(size=sim.seen.standstill.max() + 1)
@@ -95,6 +104,12 @@ def test_what_has_no_name_is_located(field: Field, place_: Place) -> None:
     found = diagnose(bent(measured(crane_cell()), field))
     assert found.causes[0].place.same_as(place_)
     assert not any(cause.probability > 0.5 for cause in found.causes if cause.place.effect != UNKNOWN)
+
+
+def test_a_base_that_wanders_is_not_said_to_drift_or_to_have_shifted() -> None:
+    found = diagnose(bent(measured(crane_cell()), roam))
+    assert {cause.place.effect for cause in found.causes} >= {"drift", "base_shift"}
+    assert not any(cause.probability > 0.5 for cause in found.causes)
 
 
 @pytest.mark.parametrize("rows", [(9,), (40,), (9, 10), (-4,)])
