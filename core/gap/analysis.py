@@ -23,6 +23,7 @@ from core.gap.scatter import joint_scatter
 from core.gap.search import Found, search
 from core.gap.sharpened import sharpened
 from core.gap.sim import Sim
+from core.gap.split import split
 from core.gap.swings import swings
 from core.gap.whitening import whitening
 from core.geometry import Array
@@ -211,13 +212,19 @@ def analyse(
         better = bool(fresh) if turn == 0 else _matter(fresh, problem, best)
         settled = _settled(noise, learnt.noise) and straight and not better
         if settled or turn == PASSES - 1:
-            best = replace(best, found=plainer(problem, best.evidence, best.found, best.given))
+            best = replace(best, found=_as_named(problem, best))
             return Analysis(sim, told_doings, problem, best, noise, residual_m, placed)
         noise, library = learnt.noise, [*library, *fresh]
         if not straight:
             sim, aim = learnt.sim, learnt.residual_m
         # The largest things in memory are not held twice.
         del problem, best
+
+
+def _as_named(problem: Problem, best: Hypothesis) -> Found:
+    """What was found, without names that only stand in for others."""
+    known = best.threshold, best.given
+    return plainer(problem, best.evidence, split(problem, best.evidence, best.found, *known), *known)
 
 
 @dataclass(frozen=True, eq=False)

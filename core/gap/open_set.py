@@ -284,7 +284,8 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Cho
         others = small
         if _smooth(spot.candidate(first)):
             others = without(small, [g for g in small.groups if _imitates(judge.problem.candidates[g])])
-        if others.groups and (others is small or spot.share([first]) >= LOCALLY):
+        beyond = replace(spot, elsewhere=joined(elsewhere, _frames(judge, others)))
+        if others.groups and (others is small or beyond.share([first]) >= LOCALLY):
             named = _names(replace(spot, elsewhere=joined(elsewhere, others)))
         beside = joined(small, without(here, [here.groups[k] for k in spot.forms(first)]))
         imitate = any(_smooth(judge.problem.candidates[g]) for g in beside.groups)
@@ -409,7 +410,18 @@ def _names(spot: Spot) -> list[Stand]:
         more, completes = closed - spot.closes_m2(forms), spot.share(both) >= EXACTLY and spot.to_the_noise
         if more >= WEAKER * closed or (completes and more > spot.judge.floor_m2):
             return [_stand(spot, which, spot.share(both)) for which in (forms, rest)]
-    return []
+    return _with_a_frame(spot, first)
+
+
+def _with_a_frame(spot: Spot, first: int) -> list[Stand]:
+    """A smooth error of a joint and the frame before it, in their order, where they close all down to the noise."""
+    pairs = [[first, k] for k in spot.order if _frame_and_drive(spot, first, k)]
+    both = max(pairs, key=spot.closes_m2, default=[])
+    if not both or spot.share(both) < EXACTLY:
+        return []
+    if spot.closes_m2(both) - spot.closes_m2([first]) <= spot.judge.floor_m2:
+        return []
+    return [_stand(spot, [k], spot.share(both)) for k in both]
 
 
 def _second(spot: Spot, which: list[int]) -> list[int]:
@@ -420,7 +432,11 @@ def _second(spot: Spot, which: list[int]) -> list[int]:
         return []
     sure = spot.share(which) >= EXACTLY
     for k in spot.order:
-        pair = k not in which and (_make_a_pair(spot, which[0], k) or (sure and _differ(spot, which[0], k)))
+        pair = k not in which and (
+            _make_a_pair(spot, which[0], k)
+            or _frame_and_drive(spot, which[0], k)
+            or (sure and _differ(spot, which[0], k))
+        )
         if pair and spot.closes_m2([*which, *spot.forms(k)]) - closed >= LOCALLY * left:
             return spot.forms(k)
     return []
@@ -430,6 +446,15 @@ def _make_a_pair(spot: Spot, first: int, second: int) -> bool:
     """Whether two names at one variable can both be right: two smooth functions of one joint imitate any third."""
     smooth = all(_smooth(spot.candidate(k)) for k in (first, second))
     return _differ(spot, first, second) and not smooth
+
+
+def _frame_and_drive(spot: Spot, first: int, second: int) -> bool:
+    """Whether one is a frame and the other a smooth error of the drive after it, where all leaves no more than noise.
+
+    Together they do not imitate a third of the same joint: a frame moves all that lies beyond.
+    """
+    both = [spot.candidate(k) for k in (first, second)]
+    return all(_smooth(one) for one in both) and sum(_imitates(one) for one in both) == 1 and spot.to_the_noise
 
 
 def _differ(spot: Spot, first: int, second: int) -> bool:
@@ -442,6 +467,11 @@ def is_slow(candidate: Candidate) -> bool:
     """Whether a mesh has so few teeth that anything smooth looks like it."""
     order = drives.order_of(candidate)
     return candidate.place.effect == "mesh" and order is not None and order < FEWEST_TEETH
+
+
+def _frames(judge: Judge, chosen: Chosen) -> Chosen:
+    """The frames among what was found."""
+    return without(chosen, [g for g in chosen.groups if judge.problem.candidates[g].place.effect != "geometry"])
 
 
 def _imitates(candidate: Candidate) -> bool:

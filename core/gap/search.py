@@ -58,7 +58,7 @@ def search(
             chosen = _exchanged(evidence, among, cost, chosen, given)
     chosen = _needed(evidence, cost, chosen, given, threshold)
     total = evidence.given(joined(given, chosen)) - sum(cost[g] for g in chosen.groups)
-    main = _without_the_least(evidence, chosen, given)
+    main = without_the_least(evidence, chosen, given)
     worth = worth_naming(evidence, among, cost, chosen, main, given)
     return Found(chosen, alone, alone_size, worth, main, float(total))
 
@@ -83,10 +83,11 @@ def worth_naming(
     if len(main.groups) == len(chosen.groups):
         return main
     kept = _exchanged(evidence, among, cost, main, given)
-    return _without_the_least(evidence, kept, given)
+    return without_the_least(evidence, kept, given)
 
 
-def _without_the_least(evidence: Evidence, chosen: Chosen, given: Chosen) -> Chosen:
+def without_the_least(evidence: Evidence, chosen: Chosen, given: Chosen) -> Chosen:
+    """What is left when candidates are dropped that add next to nothing to the others."""
     while len(chosen.groups) > 1:
         bare, whole = evidence.given(given), evidence.given(joined(given, chosen))
         lost = [whole - evidence.given(joined(given, chosen.without(k))) for k in range(len(chosen.groups))]

@@ -40,6 +40,35 @@ def test_two_names_at_one_joint_are_both_told_though_one_is_small(small: str) ->
     assert found.left_rms_m < 1.2 * found.noise.floor_rms_m
 
 
+PAIRS = (
+    ("ratio:2:0.3%", "geometry:1.a:1mm", Place("ratio", joint=2), Place("geometry", frame=1)),
+    ("ratio:3:0.3%", "geometry:2.alpha:0.1deg", Place("ratio", joint=3), Place("geometry", frame=2)),
+    ("ratio:3:0.3%", "geometry:2.alpha:0.2deg", Place("ratio", joint=3), Place("geometry", frame=2)),
+)
+
+
+@pytest.mark.parametrize(("one", "other", "drive", "frame"), PAIRS, ids=[" ".join(pair[:2]) for pair in PAIRS])
+def test_a_drive_and_the_frame_before_it_are_both_told(one: str, other: str, drive: Place, frame: Place) -> None:
+    """Each is smooth, and a wobbling axis does nearly what both do."""
+    found = diagnose(measured(crane_cell(), one, other))
+    assert [cause.place for cause in found.causes] == [drive, frame]
+    assert found.left_rms_m < 1.1 * found.noise.floor_rms_m
+
+
+def test_a_form_of_many_numbers_does_not_stand_in_for_two_others() -> None:
+    """A wobble of axis 3 alone explains nearly all: more than what is off once a turn does alone."""
+    found = diagnose(measured(crane_cell(), "eccentricity:3:0.1deg", "geometry:2.a:0.5mm"))
+    assert found.causes[0].place == Place("eccentricity", joint=3)
+    assert not any(cause.place.effect == "axis_wobble" for cause in found.causes)
+    assert found.left_rms_m < 1.1 * found.noise.floor_rms_m
+
+
+@pytest.mark.parametrize("joint", [2, 3])
+def test_a_wobbling_axis_is_not_split_into_two_others(joint: int) -> None:
+    found = diagnose(measured(crane_cell(), f"axis_wobble:{joint}:0.05deg"))
+    assert [cause.place for cause in found.causes] == [Place("axis_wobble", joint=joint)]
+
+
 @pytest.mark.parametrize(
     ("before", "after", "faint"),
     [
