@@ -48,7 +48,7 @@ def _left(
     known = joined(given, chosen)
     among = [g for g in problem.named if g not in known.groups and problem.candidates[g].place.joint not in gone]
     most = MOST_CAUSES - len(chosen.groups)
-    return search(evidence, np.array(among), problem.cost, threshold, known, most).chosen
+    return search(evidence, np.array(among, dtype=int), problem.cost, threshold, known, most).chosen
 
 
 def _blurred(

@@ -46,7 +46,7 @@ def search(
     """
     alone, alone_size = np.full(len(cost), -np.inf), np.ones(len(cost))
     chosen = Chosen()
-    while len(chosen.groups) < most:
+    while len(chosen.groups) < min(most, len(among)):
         gains, score = _scores(evidence, among, cost, joined(given, chosen))
         if not chosen.groups:
             alone[among], alone_size[among] = score, gains.size

@@ -41,7 +41,7 @@ def _in_two(
     rest = chosen.without(chosen.groups.index(group))
     known, place = joined(given, rest), problem.candidates[group].place
     others = [g for g in problem.named if g not in known.groups and not problem.candidates[g].place.same_as(place)]
-    pair = search(evidence, np.array(others), problem.cost, threshold, known, PAIR).chosen
+    pair = search(evidence, np.array(others, dtype=int), problem.cost, threshold, known, PAIR).chosen
     mine, theirs = joined(given, chosen), joined(known, pair)
     more = evidence.given(theirs) - evidence.given(mine)
     more -= sum(problem.cost[g] for g in pair.groups) - problem.cost[group]

@@ -215,6 +215,23 @@ class TestGivenAnswers:
         assert [c.place for c in told.causes] == [Place("ratio", joint=2)]
         assert told.left_rms_m == pytest.approx(report("crane", "ratio:2:0.3%").left_rms_m, rel=0.1)
 
+    @pytest.mark.parametrize(
+        ("fault", "answer"),
+        [
+            ("quantisation:2:0.03deg", {"effect": "quantisation", "joint": 2}),
+            ("quantisation:2:0.03deg", {"effect": "quantisation"}),
+            ("axis_wobble:3:0.05deg", {"effect": "axis_wobble", "joint": 3}),
+            ("hysteresis:1:0.05deg", {"effect": "hysteresis", "joint": 1}),
+            ("geometry:2.alpha:0.1deg", {"effect": "geometry", "frame": 2}),
+            ("drift:-:0.2mm/h", {"effect": "drift"}),
+        ],
+    )
+    def test_told_of_any_effect_nothing_else_is_put_in_its_place(self, fault: str, answer: dict[str, object]) -> None:
+        """Also where the library holds nothing of it before the data have been looked at: steps of encoders."""
+        told = diagnose(measured(crane_cell(), fault), told=[answer])
+        assert {cause.place.effect for cause in told.causes} == {answer["effect"]}
+        assert told.left_rms_m < 1.5 * told.noise.floor_rms_m
+
     def test_an_effect_that_the_library_does_not_know_is_located(self) -> None:
         found = diagnose(measured(crane_cell(), "drift:-:0.2mm/h"), without=["drift"])
         assert found.verdict is Verdict.UNEXPLAINED

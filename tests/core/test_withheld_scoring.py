@@ -13,7 +13,7 @@ from tests.benchmarks.withheld.command import run
 from tests.benchmarks.withheld.effects.library import NAMED
 from tests.benchmarks.withheld.matching import is_right, right_in_class, right_place
 from tests.benchmarks.withheld.product import Json, Product, Verdict, ask
-from tests.benchmarks.withheld.score_table import failed, rows, table
+from tests.benchmarks.withheld.score_table import failed, failures, rows, table
 from tests.benchmarks.withheld.scoring import Outcome, brier, calibration_error
 
 TRUTH: Json = {"kind": "single", "arm": "irb", "gap": 3.0, "noise": "stated", "protocol": "rich", "records": 1000}
@@ -190,6 +190,17 @@ def test_refusals_and_crashes_are_told_apart(tmp_path: Path) -> None:
     assert refused.refused == "nothing moves, expected a sweep"
     assert "KeyError" in crashed.crashed
     assert not refused.crashed
+
+
+@pytest.mark.parametrize("asked", ["oracle", "without"])
+def test_a_crash_counts_whatever_was_asked(asked: str) -> None:
+    fine = outcome([WINDUP], gap(WINDUP))
+    broken = outcome([WINDUP], gap(WINDUP), **{asked: Verdict(None, 1.0, crashed="ValueError: empty")})
+    assert not failed(fine)
+    assert failed(broken)
+    (row,) = (one for one in rows([fine, broken]) if one.figure.startswith("crashed"))
+    assert row.met is False
+    assert "ValueError: empty" in failures([fine, broken])
 
 
 def test_another_day_that_fails_does_not_lose_the_verdict(tmp_path: Path) -> None:

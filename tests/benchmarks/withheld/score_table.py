@@ -161,7 +161,7 @@ def _physics_rows(outcomes: list[Outcome]) -> Iterator[Row]:
 def _thin_rows(outcomes: list[Outcome]) -> Iterator[Row]:
     thin = _of(outcomes, "thin")
     yield _share("thin protocols: a wrong name with probability > 0.5", thin, lambda o: o.wrong_name, at_most=0.0)
-    yield _share("crashed, any campaign", outcomes, lambda o: o.word == "crashed", at_most=0.0)
+    yield _share("crashed, whatever was asked of a campaign", outcomes, lambda o: bool(o.crashed), at_most=0.0)
     rich = [outcome.verdict.seconds for outcome in outcomes if outcome.kind != "thin"]
     yield Row("seconds a campaign, median", float(np.median(rich)) if rich else float("nan"), len(rich), at_most=5.0)
     yield Row("seconds a campaign, longest", max(rich, default=float("nan")), len(rich))
@@ -176,7 +176,7 @@ def failures(outcomes: list[Outcome]) -> str:
 
 def failed(outcome: Outcome) -> bool:
     """Whether a campaign counts against a bar."""
-    if outcome.word == "crashed":
+    if outcome.crashed:
         return True
     if outcome.kind == "nothing":
         return outcome.claims
@@ -196,7 +196,7 @@ def _failure(outcome: Outcome) -> tuple[str, ...]:
     what = [str(truth["noise"])] if outcome.kind == "nothing" else [words(answer) for answer in outcome.answers]
     what += {"thin": [f"({truth['protocol']})"], "other": [f"({', '.join(truth['effects'])})"]}.get(outcome.kind, [])
     said = "; ".join(f"{words(cause)} p={probability(cause):.2f}{_class(cause)}" for cause in outcome.causes[:4])
-    said = said or (outcome.verdict.refused or outcome.verdict.crashed[-120:]).replace("\n", " ")
+    said = f"{said} {outcome.verdict.refused or outcome.crashed[-120:]}".replace("\n", " ").strip()
     return outcome.name, outcome.kind, str(truth["arm"]), f"{truth['gap']:g}", ", ".join(what), outcome.word, said
 
 

@@ -55,6 +55,12 @@ class Outcome:
         return str(self.verdict.gap["verdict"])
 
     @property
+    def crashed(self) -> str:
+        """Of whatever was asked: blind, with the cause told, with it forgotten."""
+        asked = (self.verdict, self.oracle, self.without)
+        return next((one.crashed for one in asked if one is not None and one.crashed), "")
+
+    @property
     def named(self) -> list[Json]:
         """Causes with a name of the table."""
         return [cause for cause in self.causes if cause.get("effect") != UNKNOWN]
