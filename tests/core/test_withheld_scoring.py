@@ -17,6 +17,7 @@ from tests.benchmarks.withheld.score_table import failed, failures, rows, table
 from tests.benchmarks.withheld.scoring import Outcome, brier, calibration_error
 
 TRUTH: Json = {"kind": "single", "arm": "irb", "gap": 3.0, "noise": "stated", "protocol": "rich", "records": 1000}
+TRUTH |= {"effects": ["compliance"]}
 BEND, WINDUP = {"effect": "flexure", "joint": 1}, {"effect": "compliance", "joint": 2}
 
 
