@@ -26,6 +26,8 @@ RIPPLE = 6.0
 EXACT, EXACTLY = frozenset({"zero_offset", "ratio", "eccentricity", "mesh"}), 0.96
 """Smooth effects whose forms are exact must close nearly all, down to the noise with all else that was found: whatever
 is smooth looks like them otherwise."""
+NEXT_TO_ALL = 0.99
+"""Where they close so much of what can be closed at their joint, what is left beyond the noise is elsewhere."""
 FORMED, OUTDONE = frozenset({"zero_offset", "ratio", "eccentricity", "linkage"}), 0.015
 """Effects of one joint of which a function without a name explains no more by such a share of the evidence."""
 WAVES, COMPOSED = 2, 0.02
@@ -398,9 +400,11 @@ def _names(spot: Spot) -> list[Stand]:
     likely = spot.candidate(first)
     exact = likely.place.effect in EXACT and _smooth(likely)
     imitates = exact and (likely.place.effect != "mesh" or is_slow(likely))
-    enough = spot.share([first]) >= (EXACTLY if exact else LOCALLY) and (spot.to_the_noise or not imitates)
+    share = spot.share([first])
+    known = not imitates or spot.to_the_noise or share >= NEXT_TO_ALL
+    enough = share >= (EXACTLY if exact else LOCALLY) and known
     if enough or (len(forms) > 1 and spot.share(forms) >= LOCALLY):
-        share = spot.share([first] if enough else forms)
+        share = share if enough else spot.share(forms)
         second = _second(spot, forms)
         return [_stand(spot, which, share) for which in (forms, second) if which]
     pairs = [[*forms, *spot.forms(k)] for k in spot.order if _make_a_pair(spot, first, k)]

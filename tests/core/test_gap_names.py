@@ -55,6 +55,14 @@ def test_a_drive_and_the_frame_before_it_are_both_told(one: str, other: str, dri
     assert found.left_rms_m < 1.1 * found.noise.floor_rms_m
 
 
+def test_what_is_rough_at_one_joint_does_not_hide_a_name_at_another() -> None:
+    """The play of joint 3 is described less than perfectly; nothing else than its ratio acts at joint 1."""
+    found = diagnose(measured(crane_cell(), "hysteresis:3:0.05deg", "ratio:1:0.2%", seed=0))
+    assert found.causes[0].place == Place("ratio", joint=1)
+    assert found.causes[0].probability > 0.5
+    assert found.causes[1].place.joint == 3
+
+
 def test_a_form_of_many_numbers_does_not_stand_in_for_two_others() -> None:
     """A wobble of axis 3 alone explains nearly all: more than what is off once a turn does alone."""
     found = diagnose(measured(crane_cell(), "eccentricity:3:0.1deg", "geometry:2.a:0.5mm"))
