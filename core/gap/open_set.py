@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 
-from core.gap.effects import drives
 from core.gap.effects.candidate import Candidate
 from core.gap.evidence import NOTHING, Chosen, Evidence, joined, without
 from core.gap.kept_out import KeptOut
@@ -21,7 +20,7 @@ from core.gap.result import Place
 from core.geometry import Array
 
 SMOOTH = frozenset({"zero_offset", "ratio", "eccentricity", "linkage", "axis_wobble", "geometry"})
-"""Smooth functions of one joint; so is a mesh with fewer waves a turn than ``RIPPLE``."""
+"""Smooth functions of one joint; so is a mesh with fewer waves than ``RIPPLE``."""
 RIPPLE = 6.0
 EXACT, EXACTLY = frozenset({"zero_offset", "ratio", "eccentricity", "mesh"}), 0.96
 """Smooth effects whose forms are exact must close nearly all, down to the noise with all else that was found: whatever
@@ -33,7 +32,7 @@ FORMED, OUTDONE = frozenset({"zero_offset", "ratio", "eccentricity", "linkage"})
 WAVES, COMPOSED = 2, 0.02
 """So many more waves of one joint, which say such a share of what a mesh does, make no mesh of it."""
 FEWEST_TEETH = 3.0
-"""Times a turn."""
+"""Times a turn, or over the whole way of a joint that slides."""
 LOCALLY = 0.92
 """Share of what nameless functions close that a name must close to stand."""
 MOSTLY = 0.85
@@ -469,8 +468,7 @@ def _differ(spot: Spot, first: int, second: int) -> bool:
 
 def is_slow(candidate: Candidate) -> bool:
     """Whether a mesh has so few teeth that anything smooth looks like it."""
-    order = drives.order_of(candidate)
-    return candidate.place.effect == "mesh" and order is not None and order < FEWEST_TEETH
+    return candidate.place.effect == "mesh" and candidate.waves < FEWEST_TEETH
 
 
 def _frames(judge: Judge, chosen: Chosen) -> Chosen:
@@ -484,8 +482,7 @@ def _imitates(candidate: Candidate) -> bool:
 
 
 def _smooth(candidate: Candidate) -> bool:
-    orders = dict(candidate.fixed)
-    return candidate.place.effect in SMOOTH or orders.get("order_1", np.inf) < RIPPLE
+    return candidate.place.effect in SMOOTH or candidate.waves < RIPPLE
 
 
 def _pick(chosen: Chosen, which: list[int]) -> Chosen:

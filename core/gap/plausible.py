@@ -95,7 +95,7 @@ def plausible(one: Own, chain: Robot) -> bool:
         return bool(WHOLE[0] < one.numbers[0] * one.scale[0] < WHOLE[1])
     if effect == "geometry":
         return not _turns_merely(one, chain)
-    return effect != "axis_wobble" or not _cancels(one)
+    return effect != "axis_wobble" or not (_cancels(one) or _errs_along(one, chain))
 
 
 def _grows(one: Own) -> bool:
@@ -116,10 +116,20 @@ def _turns_merely(one: Own, chain: Robot) -> bool:
     return _is(one, np.concatenate([axis, np.cross(origin, axis)])[list(LINK_AXES)] / one.scale)
 
 
-def _is(one: Own, direction: Array) -> bool:
-    """Whether the numbers move points as those of one direction (w,) do, up to a little or to noise."""
+def _errs_along(one: Own, chain: Robot) -> bool:
+    """Whether a guide is off along its way alone: that is the drive's."""
+    if not chain.sliding[one.candidate.place.joint - 1]:
+        return False
+    along = [k for k, name in enumerate(one.candidate.names) if name.startswith("shift_along_z")]
+    return bool(along) and _is(one, np.eye(len(one.numbers))[:, along])
+
+
+def _is(one: Own, directions: Array) -> bool:
+    """Whether the numbers move points as those of some directions (w,) or (w, k) do, up to a little or to noise."""
+    basis = directions.reshape(len(one.numbers), -1)
     moved = one.square @ one.numbers
-    alike = float(direction @ moved) ** 2 / max(float(direction @ one.square @ direction), 1e-300)
+    pull, inner = basis.T @ moved, basis.T @ one.square @ basis
+    alike = float(pull @ np.linalg.lstsq(inner, pull, rcond=None)[0])
     whole = float(one.numbers @ moved)
     return whole - alike < max((1 - MERELY) * whole, SURELY**2)
 

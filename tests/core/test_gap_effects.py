@@ -357,7 +357,7 @@ class TestStructure:
             if world(name)[0].seen.chain.sliding[j]:
                 # Half waves from one end of the way to the other.
                 x = np.pi * (x - (x.min() + x.max()) / 2) / np.ptp(x)
-            times = {"": 1, "_of_twice": 2, "_of_three_times": 3}
+            times = {"": 1, "_of_twice": 2, "_of_three_times": 3, "_of_four_times": 4, "_of_five_times": 5}
             waves = {f"sine{words}": np.sin(k * x) for words, k in times.items()}
             waves |= {f"cosine{words}": np.cos(k * x) for words, k in times.items()}
             numbers = np.linspace(-0.02, 0.03, len(one.names))

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_cells import crane_cell, measured
+from gap_cells import crane_cell, measured, scara_cell
+from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from core.gap import posterior
@@ -85,6 +86,31 @@ def bump(sim: Sim) -> Array:
     """Joint 1 is off at one place of its way: many waves together look so, no single one does."""
     angle = 8e-4 * np.exp(-(((sim.seen.active[:, 0] - 0.2) / 0.22) ** 2))
     return sim.moved_m({Slot(Part.DRIVE, 0): angle}) - sim.points_m()
+
+
+def bend(sim: Sim) -> Array:
+    """The guide of joint 3 is bent: it tilts and shifts along a path through five places of its way."""
+    x = sim.seen.active[:, 2]
+    share = (x - x.min()) / np.ptp(x)
+    places = np.random.default_rng(4).normal(size=(5, 6)) * [5e-4, 5e-4, 0, 2e-4, 2e-4, 1e-4]
+    path = CubicSpline(np.linspace(0, 1, 5), places)(share)
+    return sim.moved_m({Slot(Part.AXIS, 2, k): path[:, k] for k in range(6)}) - sim.points_m()
+
+
+def cable(sim: Sim) -> Array:
+    """A cable along the guide of joint 3 is taut at one end and slack at the other."""
+    x = sim.seen.active[:, 2]
+    share = (x - x.min()) / np.ptp(x)
+    return sim.moved_m({Slot(Part.DRIVE, 2): 4e-4 * np.tanh((share - 0.6) / 0.12)}) - sim.points_m()
+
+
+def test_a_bent_guide_is_named_and_what_errs_along_it_is_not_taken_for_one() -> None:
+    found = diagnose(bent(measured(scara_cell()), bend))
+    assert found.causes[0].place.same_as(Place("axis_wobble", joint=3))
+    assert found.causes[0].probability > 0.9
+    found = diagnose(bent(measured(scara_cell()), cable))
+    assert found.causes[0].place.same_as(Place(UNKNOWN, joint=3))
+    assert not any(cause.probability > 0.5 for cause in found.causes if cause.place.effect != UNKNOWN)
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,8 @@ class Candidate:
     """Sizes of the unknown numbers that are taken as equally likely; empty: ones."""
     fixed: tuple[tuple[str, float], ...] = ()
     """Numbers that were chosen rather than fitted, by name with unit."""
+    waves: float = np.inf
+    """Of a periodic error: its periods in a turn, or over the whole way of a joint that slides."""
 
     @property
     def named(self) -> bool:

@@ -137,7 +137,8 @@ def _harmonic(effect: str, doings: Doings, joint: int, order: float, choices: in
         atom += ", with its double"
     names = tuple(f"{wave}{OF_TIMES[k]}_{of}" for k in times for wave in ("sine", "cosine"))
     reference = tuple(ANGLE / k**2 for k in times for _ in range(2))
-    return Candidate(Place(effect, joint=joint + 1), atom, names, columns, choices, reference, fixed)
+    waves = order if of == "rad" else order * float(doings.seen.span[joint]) / (2 * np.pi)
+    return Candidate(Place(effect, joint=joint + 1), atom, names, columns, choices, reference, fixed, waves)
 
 
 def _spindle_orders(doings: Doings, joint: int) -> list[float]:
@@ -198,7 +199,7 @@ def quantisation(doings: Doings, steps: dict[int, tuple[float, float]]) -> Encod
     said = ", ".join(f"{one[0]:.8g} {unit(doings, j)} from {one[1]:.3f} of one" for j, one in steps.items())
     joint = next(iter(steps)) + 1 if len(steps) == 1 else None
     return EncoderSteps(
-        Place("quantisation", joint=joint), f"steps of {said}", ("share_1",), columns, 200, (1.0,), fixed, steps
+        Place("quantisation", joint=joint), f"steps of {said}", ("share_1",), columns, 200, (1.0,), fixed, steps=steps
     )
 
 
