@@ -292,7 +292,11 @@ def _at(judge: Judge, variable: str, here: Chosen, elsewhere: Chosen, small: Cho
         imitate = any(_smooth(judge.problem.candidates[g]) for g in beside.groups)
         if not named and spot.share([first]) >= MOSTLY and not imitate:
             named = _names(replace(spot, here=_pick(here, spot.forms(first)), elsewhere=joined(elsewhere, beside)))
-    if named and (not foremost or all(_right(judge, one, joined(elsewhere, chosen_of(named))) for one in named)):
+    right = [one for one in named if not foremost or _right(judge, one, joined(elsewhere, chosen_of(named)))]
+    if len(right) < len(named) and right[:1] == named[:1] and spot.share(spot.forms(spot.order[0])) >= LOCALLY:
+        # The first suffices: what its second stands in for does not make it wrong.
+        named = right
+    if named and right == named:
         return named
     groups = joined(local, here)
     return [Stand(unknown_at(variable), groups.groups, groups.sizes, spot.share(spot.order[:1]))]

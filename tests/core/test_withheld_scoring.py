@@ -13,11 +13,11 @@ from tests.benchmarks.withheld.command import run
 from tests.benchmarks.withheld.effects.library import NAMED
 from tests.benchmarks.withheld.matching import is_right, right_in_class, right_place
 from tests.benchmarks.withheld.product import Json, Product, Verdict, ask
-from tests.benchmarks.withheld.score_table import failed, failures, rows, table
+from tests.benchmarks.withheld.score_table import by_part, failed, failures, rows, table
 from tests.benchmarks.withheld.scoring import Outcome, brier, calibration_error
 
 TRUTH: Json = {"kind": "single", "arm": "irb", "gap": 3.0, "noise": "stated", "protocol": "rich", "records": 1000}
-TRUTH |= {"effects": ["compliance"]}
+TRUTH |= {"effects": ["compliance"], "seed": 1}
 BEND, WINDUP = {"effect": "flexure", "joint": 1}, {"effect": "compliance", "joint": 2}
 
 
@@ -103,6 +103,13 @@ def test_an_effect_out_of_the_library_is_noticed_or_not() -> None:
     assert noticed(gap(sure | {"class": [BEND, {"effect": "zero_offset", "joint": 2}]}))
 
 
+def test_what_is_one_and_the_same_on_an_arm_is_right_without_the_other() -> None:
+    without = Verdict(gap(WINDUP | {"probability": 0.9}), 1.0)
+    assert outcome([{"effect": "payload"}], gap(), arm="scara", without=without).noticed_without
+    assert not outcome([{"effect": "payload"}], gap(), arm="irb", without=without).noticed_without
+    assert not outcome([{"effect": "flexure", "joint": 1}], gap(), arm="scara", without=without).noticed_without
+
+
 def test_closure_is_held_against_the_oracle_and_the_promise_against_another_day() -> None:
     cause = WINDUP | {"probability": 0.9}
     oracle = Verdict(gap(cause, left=0.05), 1.0)
@@ -133,6 +140,13 @@ def test_the_table_says_which_bars_are_met() -> None:
     assert [failed(right), failed(wrong)] == [False, True]
 
 
+def test_parts_are_scored_one_by_one() -> None:
+    right, wrong = gap(WINDUP | {"probability": 0.9}), gap(BEND | {"probability": 0.9})
+    found = [outcome([WINDUP], said, seed=seed) for said, seed in ((right, 10), (right, 10_003), (wrong, 10_004))]
+    line = next(line for line in by_part(found, (10, 10_000)).splitlines() if "gap/noise 3: right by name" in line)
+    assert [cell.strip() for cell in line.strip("|").split("|")][1:] == ["1.000", "0.500"]
+
+
 @pytest.mark.parametrize("seeds", SEEDS)
 def test_the_suite_is_large_and_its_seeds_are_its_own(seeds: str) -> None:
     cases = all_cases(seeds)
@@ -141,6 +155,7 @@ def test_the_suite_is_large_and_its_seeds_are_its_own(seeds: str) -> None:
     others = {case.seed for name in SEEDS if name != seeds for case in all_cases(name)}
     assert len(mine) == len(cases)
     assert not mine & others
+    assert len(SEEDS[seeds]) * 300 <= len(cases)
     for gap_size in (1.0, 3.0, 10.0):
         assert {case.effects[0] for case in cases if case.kind == "single" and case.gap == gap_size} == set(NAMED)
     assert not any((case.arm, effect) in IMPOSSIBLE for case in cases for effect in case.effects)

@@ -9,7 +9,7 @@ from tests.benchmarks.withheld.asking import Load, ask_all
 from tests.benchmarks.withheld.cases import KINDS, SEEDS
 from tests.benchmarks.withheld.making import chosen, make_suite
 from tests.benchmarks.withheld.product import own_product
-from tests.benchmarks.withheld.score_table import by_effect, failures, table
+from tests.benchmarks.withheld.score_table import by_effect, by_part, failures, table
 from tests.benchmarks.withheld.scoring import read_outcomes
 
 STEPS = ("all", "make", "ask", "score")
@@ -61,6 +61,8 @@ def score(out: Path, seeds: str) -> str:
     parts = [
         f"Withheld suite, {seeds} seeds, {len(outcomes)} campaigns.",
         table(outcomes),
+        "The same, part by part:",
+        by_part(outcomes, SEEDS[seeds]),
         "Single effects, alone and among four small ones:",
         by_effect(outcomes),
         "Failures:",

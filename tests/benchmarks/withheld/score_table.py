@@ -1,6 +1,6 @@
 """The suite's table: figure, bar, what was reached, of how many."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,6 +64,14 @@ def rows(outcomes: list[Outcome]) -> list[Row]:
 def table(outcomes: list[Outcome]) -> str:
     """The rows in Markdown."""
     return markdown(("figure", "bar", "reached", "of", "met"), [row.cells() for row in rows(outcomes)])
+
+
+def by_part(outcomes: list[Outcome], first_seeds: Sequence[int]) -> str:
+    """What was reached on each part of a set: how far rows scatter from seeds to seeds."""
+    of_part = np.searchsorted(first_seeds, [outcome.truth["seed"] for outcome in outcomes], side="right") - 1
+    parts = [rows([o for o, of in zip(outcomes, of_part, strict=True) if of == k]) for k in range(len(first_seeds))]
+    header = ("figure", *(f"from seed {first}" for first in first_seeds))
+    return markdown(header, [(row[0].figure, *(one.cells()[2] for one in row)) for row in zip(*parts, strict=True)])
 
 
 def _of(outcomes: list[Outcome], *kinds: str) -> list[Outcome]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.benchmarks.withheld.asking import campaigns, read_verdicts
+from tests.benchmarks.withheld.cases import one_and_the_same
 from tests.benchmarks.withheld.matching import UNKNOWN, is_right, members, right_in_class, right_place
 from tests.benchmarks.withheld.product import Json, Verdict
 
@@ -119,13 +120,18 @@ class Outcome:
 
     @property
     def noticed_without(self) -> bool:
-        """With the effect out of the library: unknown, several causes, a class, or no great certainty."""
+        """With the effect out of the library: unknown, several causes, a class, or no great certainty.
+
+        Where two effects are one and the same on an arm, the name of the other is right: it is of the class.
+        """
         assert self.without is not None
         causes = causes_of(self.without)
         if self.without.gap is None:
             return False
         if not causes or self.without.gap["verdict"] in ABSTAINED or len(causes) > 1:
             return self.without.gap["verdict"] != "no_gap"
+        if one_and_the_same(str(self.truth["arm"]), str(causes[0]["effect"]), str(self.answers[0]["effect"])):
+            return True
         return causes[0]["effect"] == UNKNOWN or len(members(causes[0])) > 2 or probability(causes[0]) <= SURE
 
 
