@@ -41,6 +41,8 @@ class Part(Enum):
     """Everything, in the instrument's frame: turn about the middle of all points (0..2) and shift (3..5)."""
     SCALE = "scale"
     """All points, away from the middle, by a factor 1 + value."""
+    DEPTH = "depth"
+    """The same along the instrument's line of sight to the middle alone."""
     ROOM = "room"
     """A point by where it lies: along ``axis`` of the instrument's frame by value times the product ``index`` of two
     coordinates about the middle, m."""
@@ -155,6 +157,9 @@ class Sim:
         out, scale = points, motions.get(Slot(Part.SCALE))
         if scale is not None:
             out = out + scale[:, None] * (points - self.middle_m)
+        depth = motions.get(Slot(Part.DEPTH))
+        if depth is not None:
+            out = out + depth[:, None] * self._in_depth(points)
         for slot, value in motions.items():
             if slot.part is Part.ROOM:
                 out = out + value[:, None] * self._bent(slot, points)
@@ -181,6 +186,11 @@ class Sim:
         """The same sim with all targets one metre farther along an axis of their links: points go in proportion."""
         return replace(self, target_m=self.target_m + np.eye(3)[axis])
 
+    def _in_depth(self, points: Array) -> Array:
+        """How far points lie behind the middle along the line of sight, as vectors, (m, 3)."""
+        sight = self.middle_m / max(float(np.linalg.norm(self.middle_m)), 1e-12)
+        return ((points - self.middle_m) @ sight)[:, None] * sight
+
     def _placed_points(self) -> Array:
         placed = self.simulated_to_instrument
         return self.seen.simulated_m if placed is None else apply(placed, self.seen.simulated_m)
@@ -204,6 +214,8 @@ class Sim:
             return cross(unit, points - self.middle_m) if slot.axis < 3 else unit
         if slot.part is Part.SCALE:
             return points - self.middle_m
+        if slot.part is Part.DEPTH:
+            return self._in_depth(points)
         if slot.part is Part.ROOM:
             return self._bent(slot, points)
         if slot.part is Part.TARGET:

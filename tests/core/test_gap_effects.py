@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -468,8 +469,20 @@ class TestStructure:
 class TestInstrument:
     def test_scale(self, name: str) -> None:
         sim, _, _ = world(name)
-        (one,) = of(name, "scale")
-        same(moved(name, one, [0.01]), sim.points_m() + 0.01 * (sim.points_m() - sim.middle_m))
+        even, *uneven = of(name, "scale")
+        away = sim.points_m() - sim.middle_m
+        same(moved(name, even, [0.01]), sim.points_m() + 0.01 * away)
+        sight = sim.middle_m / np.linalg.norm(sim.middle_m)
+        for one in uneven:
+            deeper = (away @ sight)[:, None] * sight
+            same(moved(name, one, [0.01, -0.004]), sim.points_m() + 0.01 * away - 0.004 * deeper)
+
+    def test_depth_is_known_apart_where_the_instrument_stands_outside(self, name: str) -> None:
+        _, told, _ = world(name)
+        about_m = told.seen.point_m - told.seen.point_m.mean(axis=0)
+        for far_m, many in ((50.0, 2), (0.0, 1)):
+            seen = SimpleNamespace(point_m=about_m + np.array([far_m, 0.0, 0.0]))
+            assert len(instrument.scales(SimpleNamespace(seen=seen, count=told.count))) == many
 
     def test_drift(self, name: str) -> None:
         sim, told, _ = world(name)

@@ -21,7 +21,7 @@ def all_slots(sim: Sim) -> list[Slot]:
     slots += [Slot(part, j, k) for part in (Part.AXIS, Part.LINK, Part.BEYOND) for j in range(n) for k in range(6)]
     slots += [Slot(Part.TARGET, t, k) for t in range(targets) for k in range(3)]
     slots += [Slot(Part.ROOM, p, k) for p in range(len(PRODUCTS)) for k in range(3)]
-    return [*slots, *(Slot(Part.BASE, 0, k) for k in range(6)), Slot(Part.SCALE)]
+    return [*slots, *(Slot(Part.BASE, 0, k) for k in range(6)), Slot(Part.SCALE), Slot(Part.DEPTH)]
 
 
 def large_motions(sim: Sim, seed: int) -> dict[Slot, Array]:
@@ -65,7 +65,9 @@ def by_hand(sim: Sim, motions: dict[Slot, Array], k: int) -> Array:
         sum(motions[Slot(Part.ROOM, p, axis)][k] * placed[a] * placed[b] for p, (a, b) in enumerate(PRODUCTS))
         for axis in range(3)
     ]
-    return placed * (1 + motions[Slot(Part.SCALE)][k]) + bent + sim.middle_m
+    sight = sim.middle_m / np.linalg.norm(sim.middle_m)
+    deeper = motions[Slot(Part.DEPTH)][k] * (placed @ sight) * sight
+    return placed * (1 + motions[Slot(Part.SCALE)][k]) + deeper + bent + sim.middle_m
 
 
 @pytest.mark.parametrize("name", ARMS)

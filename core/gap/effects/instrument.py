@@ -7,10 +7,13 @@ from core.gap.effects.candidate import ANGLE, LENGTH, Candidate, Column
 from core.gap.observations import Observations
 from core.gap.result import Place
 from core.gap.sim import Part, Slot
+from core.geometry import Array
 
 MOMENTS = 28
 """Records that are tried as the one from which something stands elsewhere."""
 EDGE = 0.03
+UNEVEN = 0.1
+"""Of the error of a length unit: so much more or less of it lies along the line of sight."""
 CREEP_SHARES = (0.15, 0.5)
 BASE_NAMES = tuple(f"turn_about_{a}_rad" for a in "xyz") + tuple(f"shift_along_{a}_m" for a in "xyz")
 BASE_SIZES = (ANGLE,) * 3 + (LENGTH,) * 3
@@ -34,10 +37,25 @@ def target_slips(doings: Doings) -> list[Candidate]:
 
 
 def scales(doings: Doings) -> list[Candidate]:
+    """Of all lengths alike; or a little more or less along the line of sight, where depth is found in another way."""
+
     def columns(doings: Doings) -> list[Column]:
         return [[(Slot(Part.SCALE), np.ones(doings.count))]]
 
-    return [Candidate(Place("scale"), "", ("error_1",), columns, 1, (1e-4,))]
+    def with_depth(doings: Doings) -> list[Column]:
+        return [*columns(doings), [(Slot(Part.DEPTH), np.ones(doings.count))]]
+
+    uneven, size = ("error_1", "more_along_the_line_of_sight_1"), (1e-4, UNEVEN * 1e-4)
+    out = [Candidate(Place("scale"), "", ("error_1",), columns, 2, (1e-4,))]
+    if _from_outside(doings.seen.point_m):
+        out.append(Candidate(Place("scale"), "uneven", uneven, with_depth, 2, size))
+    return out
+
+
+def _from_outside(point_m: Array) -> bool:
+    """Whether the instrument, where its frame begins, stands outside of the points it sees, (m, 3)."""
+    middle = point_m.mean(axis=0)
+    return bool(np.linalg.norm(middle) > np.linalg.norm(point_m - middle, axis=1).max())
 
 
 def moments(doings: Doings, of: np.ndarray | None = None) -> list[int]:
